@@ -1,0 +1,109 @@
+//! A robot arm: its chain, what its links weigh, how they are shaped, and what stands around it.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use crate::frames::Pose;
+use crate::kinematics::Chain;
+
+/// A nominal arm with everything that is known about it without measuring.
+#[derive(Clone, Debug)]
+pub struct Arm {
+    /// Name of the robot.
+    pub name: String,
+    /// Kinematics and joint limits.
+    pub chain: Chain,
+    /// `links[0]` is the base link; `links[i]` moves with joint `i`, its frame is the chain's frame named [`Link::name`]. The
+    /// last link carries the tool.
+    pub links: Vec<Link>,
+    /// Bodies of the cell, fixed to the base frame: floor, mounting plate.
+    pub fixtures: Vec<Fixture>,
+    /// Pairs of links (by index, smaller first) that are never checked against each other, besides neighbours.
+    pub uncollidable: Vec<(usize, usize)>,
+    /// Acceleration of free fall in base, m/s².
+    pub gravity_in_base: Vector3<f64>,
+}
+
+/// A rigid link.
+#[derive(Clone, Debug)]
+pub struct Link {
+    /// Name, and name of its frame in the chain.
+    pub name: String,
+    /// Mass distribution; `None` where the source (a URDF without inertials) has none.
+    pub inertial: Option<Inertial>,
+    /// Shapes for collision and drawing.
+    pub shapes: Vec<Shape>,
+}
+
+/// Mass, centre of mass and inertia of a link.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inertial {
+    /// kg.
+    pub mass_kg: f64,
+    /// In the link frame, m.
+    pub centre_of_mass_in_link: Point3<f64>,
+    /// About the centre of mass, along the axes of the link frame, kg·m².
+    pub inertia_in_link: Matrix3<f64>,
+}
+
+/// A body of the cell that does not move.
+#[derive(Clone, Debug)]
+pub struct Fixture {
+    /// Name for messages.
+    pub name: String,
+    /// Its shape; the frame is the arm's base.
+    pub shape: Shape,
+    /// Links (by index) that may touch it, such as the base link on its plate.
+    pub may_touch: Vec<usize>,
+}
+
+/// A primitive shape at a pose in its link's frame.
+#[derive(Clone, Debug)]
+pub struct Shape {
+    /// `link_from_shape`.
+    pub link_from_shape: Pose,
+    /// Geometry in the shape's own frame.
+    pub geometry: Geometry,
+}
+
+/// Primitive geometries, centred on the shape's frame (m).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Geometry {
+    /// A segment of `2 · half_length` along z, swept by a ball of `radius`.
+    Capsule {
+        /// Half the length of the segment, without the caps.
+        half_length: f64,
+        /// Radius of the ball.
+        radius: f64,
+    },
+    /// A cylinder of height `2 · half_length` along z.
+    Cylinder {
+        /// Half the height.
+        half_length: f64,
+        /// Radius.
+        radius: f64,
+    },
+    /// A cuboid.
+    Box {
+        /// Half the edge along each axis.
+        half_extents: [f64; 3],
+    },
+    /// A ball.
+    Sphere {
+        /// Radius.
+        radius: f64,
+    },
+}
+
+impl Arm {
+    /// Number of joints.
+    #[must_use]
+    pub fn joint_count(&self) -> usize {
+        self.chain.joints.len()
+    }
+
+    /// Whether `joints` respects every limit.
+    #[must_use]
+    pub fn within_limits(&self, joints: &[f64]) -> bool {
+        self.chain.joints.iter().zip(joints).all(|(joint, value)| (joint.lower..=joint.upper).contains(value))
+    }
+}
