@@ -1,0 +1,3 @@
+//! Choosing the configurations to measure.
+
+pub mod outcome;

@@ -1,0 +1,96 @@
+//! What a design method tells while it runs and when it has ended.
+
+use serde::{Deserialize, Serialize};
+
+use crate::quality::Indexes;
+
+/// The swarm after one iteration (iteration 0 is the initial swarm).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SwarmIteration {
+    /// k of eq. 36.
+    pub iteration: usize,
+    /// Iterations that will be made if nothing stops the swarm before.
+    pub iterations: usize,
+    /// Fitness (O_C) of each particle where it is now.
+    pub fitness: Vec<f64>,
+    /// Fitness of each particle's best-known position.
+    pub personal_best: Vec<f64>,
+    /// The particle that holds the swarm's best-known position.
+    pub best_particle: usize,
+    /// Indexes of the swarm's best-known position.
+    pub best: Indexes,
+    /// Inertia weight ω (eq. 37) and the acceleration factors c1, c2 (eq. 38) that led here; zero in the initial swarm.
+    pub inertia: f64,
+    /// See `inertia`.
+    pub c1: f64,
+    /// See `inertia`.
+    pub c2: f64,
+    /// Evaluations of the fitness so far.
+    pub evaluations: u64,
+    /// Configurations refused so far because they collide.
+    pub rejections: u64,
+    /// End points of every particle's configurations in base, m: particle by particle. Recorded as a point cloud.
+    #[serde(skip)]
+    pub end_points: Vec<Vec<[f32; 3]>>,
+    /// Configurations (rad or m) of the swarm's best-known position; empty where it is that of the iteration before.
+    pub best_configurations: Vec<Vec<f64>>,
+}
+
+/// Why a method stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StopReason {
+    /// The iterations asked for were made.
+    IterationLimit,
+    /// No particle moves any more.
+    Converged,
+    /// The method makes no iterations (random sets).
+    Drawn,
+}
+
+/// Mean, smallest and largest value of each index over random sets of the same size: what choosing is compared with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RandomReference {
+    /// Number of random sets.
+    pub sets: usize,
+    /// Mean of each index.
+    pub mean: Indexes,
+    /// Smallest of each index.
+    pub min: Indexes,
+    /// Largest of each index.
+    pub max: Indexes,
+}
+
+/// The chosen set and how it came about.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DesignOutcome {
+    /// The method's name as in the scene: `pso`, `random`.
+    pub method: String,
+    /// Chosen configurations, rad (m for prismatic joints), in the order of measuring.
+    pub configurations: Vec<Vec<f64>>,
+    /// Indexes on the identifiable subspace.
+    pub indexes: Indexes,
+    /// The same with all singular values counted, those that are zero up to rounding too: the plain reading of eqs. 15–17.
+    pub indexes_all_parameters: Indexes,
+    /// Evenness in the other workspace domain, for comparison.
+    pub evenness_domains: EvennessDomains,
+    /// Random sets of the same size.
+    pub random: RandomReference,
+    /// Names of parameters that the others can stand in for and that are therefore held at their nominal values.
+    pub dropped_parameters: Vec<String>,
+    /// Evaluations of the fitness.
+    pub evaluations: u64,
+    /// Configurations refused because they collide.
+    pub rejections: u64,
+    /// Why the method stopped.
+    pub stop: StopReason,
+}
+
+/// Evenness (eq. 25) in both readings of "workspace".
+#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize)]
+pub struct EvennessDomains {
+    /// Over the reachable workspace.
+    pub reachable: f64,
+    /// Over the cube around the reachable workspace.
+    pub bounding_cube: f64,
+}

@@ -1,0 +1,107 @@
+//! The result of an identification: what `kincal identify --json` prints and what is recorded.
+
+use serde::{Deserialize, Serialize};
+
+/// The identified arm and how well it predicts.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Identification {
+    /// Whether the fit converged; the parameters mean nothing where it did not.
+    pub converged: bool,
+    /// Why the iterations ended, in words.
+    pub reason: String,
+    /// Gauss–Newton / Levenberg–Marquardt steps.
+    pub iterations: usize,
+    /// Dimension of the identifiable subspace.
+    pub rank: usize,
+    /// Residual components fitted.
+    pub equations: usize,
+    /// Root of the weighted sum of squares over the degrees of freedom: 1 where the declared noise explains the residuals.
+    pub residual_scale: f64,
+    /// Every parameter of the model, in column order.
+    pub parameters: Vec<ParameterEstimate>,
+    /// What is identifiable, one per independent parameter.
+    pub combinations: Vec<Combination>,
+    /// Errors of the nominal model on the fitted configurations.
+    pub nominal: Errors,
+    /// Errors of the identified model on the fitted configurations.
+    pub fitted: Errors,
+    /// Errors of the identified model on held-out configurations; absent where there are none.
+    pub held_out: Option<Errors>,
+    /// Errors of the nominal model on held-out configurations.
+    pub held_out_nominal: Option<Errors>,
+    /// Residuals of every configuration, in the order of measuring.
+    pub residuals: Vec<Residual>,
+    /// What was assumed or left out.
+    pub notes: Vec<String>,
+}
+
+/// One parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ParameterEstimate {
+    /// As in the chain: `alpha3`.
+    pub name: String,
+    /// Nominal value, SI.
+    pub nominal: f64,
+    /// Identified value, SI; the nominal one where the parameter was dropped.
+    pub identified: f64,
+    /// Standard error, SI; of the combination it stands for ([`Combination`]); absent where it was dropped.
+    pub standard_error: Option<f64>,
+    /// `m` or `rad`.
+    pub unit: String,
+    /// Whether it is held at its nominal value because other parameters stand in for it.
+    pub dropped: bool,
+}
+
+/// An identifiable combination: an independent parameter together with the share of each dropped one that it takes up.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Combination {
+    /// Name of the independent parameter.
+    pub name: String,
+    /// `name + factor · other + …`, in words.
+    pub expression: String,
+    /// Estimated change from nominal, SI.
+    pub estimate: f64,
+    /// Standard error, SI.
+    pub standard_error: f64,
+    /// 95 % confidence interval of the change, SI.
+    pub interval95: [f64; 2],
+    /// `m` or `rad`.
+    pub unit: String,
+}
+
+/// Errors over a set of configurations.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Errors {
+    /// Number of configurations.
+    pub count: usize,
+    /// Distance between measured and predicted origin, m.
+    pub position_m: Summary,
+    /// Angle between measured and predicted attitude, rad; absent where no attitude was measured.
+    pub rotation_rad: Option<Summary>,
+}
+
+/// Four numbers about a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Smallest.
+    pub min: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Root of the mean square.
+    pub rms: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+/// Measured minus predicted pose of one configuration, before and after.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Residual {
+    /// Index of the measurement.
+    pub index: usize,
+    /// Measured origin, m.
+    pub position_m: [f64; 3],
+    /// Origin and rotation vector, measured minus nominal model (m, rad).
+    pub nominal: [f64; 6],
+    /// Origin and rotation vector, measured minus identified model (m, rad).
+    pub identified: [f64; 6],
+}

@@ -1,0 +1,76 @@
+//! What a real cell would know of a measured configuration. There is no truth in here.
+
+use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// What a measured configuration is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// Parameters are fitted to it.
+    Fit,
+    /// It carries the reported error and is never fitted.
+    HeldOut,
+}
+
+/// One measured configuration: joint readings and the tool's pose in the measurement frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Measurement {
+    /// Position in the order of measuring, from 0.
+    pub index: usize,
+    /// Readings with the same number are repeats of one configuration.
+    pub pose_id: usize,
+    /// For fitting or for verification.
+    pub role: Role,
+    /// Since the start of the session, s.
+    pub time_s: f64,
+    /// Joint readings, rad (m for prismatic joints).
+    pub joints: Vec<f64>,
+    /// Link temperatures as read, °C, base link first; empty where there are no sensors.
+    #[serde(default)]
+    pub temperatures_c: Vec<f64>,
+    /// Measured origin of the tool frame, m.
+    pub position_m: [f64; 3],
+    /// Measured attitude of the tool frame as quaternion x, y, z, w; absent where the sensor sees positions only.
+    #[serde(default)]
+    pub attitude_xyzw: Option<[f64; 4]>,
+}
+
+impl Measurement {
+    /// The measured origin of the tool.
+    #[must_use]
+    pub fn position(&self) -> Point3<f64> {
+        Point3::from(self.position_m)
+    }
+
+    /// The measured attitude, where there is one.
+    #[must_use]
+    pub fn attitude(&self) -> Option<UnitQuaternion<f64>> {
+        // The recorded numbers are taken as they are, so that a replay sees the bits that were measured.
+        self.attitude_xyzw.map(|[x, y, z, w]| UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z)))
+    }
+}
+
+/// Declared accuracy of the sensor, one sigma per axis: what its data sheet says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sensor {
+    /// Where the sensor stands, in base, m: the noise grows with the distance from here.
+    pub position_in_base: Point3<f64>,
+    /// Position noise at no distance, m.
+    pub position_sigma_m: f64,
+    /// Growth of the position noise with distance, m per m.
+    pub position_sigma_per_m: f64,
+    /// Attitude noise per axis, rad; `None` where the sensor sees positions only, zero where it is taken as exact.
+    pub attitude_sigma_rad: Option<f64>,
+    /// Noise of the temperature sensors, K.
+    pub temperature_sigma_k: f64,
+}
+
+impl Sensor {
+    /// Sigma of a position reading at `position` (in base), m per axis.
+    #[must_use]
+    pub fn position_sigma_at(&self, position: &Vector3<f64>) -> f64 {
+        self.position_sigma_m + self.position_sigma_per_m * (position - self.position_in_base.coords).norm()
+    }
+}

@@ -1,0 +1,3 @@
+//! Recordings: every run as a stream of events, written to MCAP, read back, and compared bit for bit.
+
+pub mod event;

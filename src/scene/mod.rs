@@ -1,0 +1,168 @@
+//! A scene: the arm, the sensor, the problem, and apart from them what is injected and hidden.
+
+use crate::arm::Arm;
+use crate::measurement::Sensor;
+
+/// Everything but the truth: what the analyser may know. This, and only this, goes into a recording.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Name; the stem of output files.
+    pub name: String,
+    /// Public seed: of the design, the held-out configurations and the order of measuring.
+    pub seed: u64,
+    /// Nominal arm and cell.
+    pub arm: Arm,
+    /// Declared accuracy.
+    pub sensor: Sensor,
+    /// The design problem.
+    pub design: DesignProblem,
+    /// How the measuring is organised.
+    pub plan: Plan,
+    /// How the residuals are weighted.
+    pub weights: Weights,
+}
+
+/// The design problem.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DesignProblem {
+    /// Number of configurations m.
+    pub count: usize,
+    /// Method.
+    pub method: Method,
+    /// Particle swarm settings.
+    pub swarm: Swarm,
+    /// Domain of the evenness.
+    pub evenness_domain: EvennessDomain,
+    /// Step of the grid over which the evenness takes its supremum, m.
+    pub evenness_step_m: f64,
+    /// Random sets that the chosen one is compared with.
+    pub random_sets: usize,
+}
+
+/// How configurations are chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Particle swarm on O_C (eqs. 33–38).
+    Pso,
+    /// Uniform within the limits, free of collisions.
+    Random,
+}
+
+/// Settings of the particle swarm (Table 5).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Swarm {
+    /// N_Swrm.
+    pub particles: usize,
+    /// N_Iter.
+    pub iterations: usize,
+    /// ω_min and ω_max of eq. 37.
+    pub inertia: [f64; 2],
+    /// ξ of eq. 36.
+    pub velocity_factor: f64,
+    /// τ of eq. 38.
+    pub tau: f64,
+}
+
+/// Which points count as workspace in eq. 25.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EvennessDomain {
+    /// Cells of the grid that the arm's end reaches.
+    Reachable,
+    /// All cells of the cube around them.
+    BoundingCube,
+}
+
+/// The measuring: how many configurations verify, and in what time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// Configurations that are measured but not fitted.
+    pub held_out_count: usize,
+    /// Whether held-out poses are read by an exact reference instrument instead of the sensor (the paper's eq. 10).
+    pub held_out_exact: bool,
+    /// From one reading to the next, s.
+    pub seconds_per_pose: f64,
+    /// Temperature at which the nominal arm is nominal, °C.
+    pub reference_temperature_c: f64,
+}
+
+/// Weights of the least-squares fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Weights {
+    /// Each residual over its declared sigma.
+    Noise,
+    /// Metres and radians alike, as in eq. 6.
+    Unit,
+}
+
+/// What is injected: the hidden part of a scene, with its own seed. Only the simulated measurement sees it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Injected {
+    /// Seed of everything that is drawn for the truth; combined with the scene's seed.
+    pub seed: u64,
+    /// Half width of the uniform errors of length parameters, m.
+    pub length_error_m: f64,
+    /// Half width of the uniform errors of angle parameters, rad.
+    pub angle_error_rad: f64,
+    /// Errors given by name (m or rad), in place of drawn ones.
+    pub parameter_errors: Vec<(String, f64)>,
+    /// Clearance of joints.
+    pub clearances: Vec<JointClearance>,
+    /// Thermal state.
+    pub thermal: Option<Thermal>,
+    /// True noise of the readings.
+    pub noise: Noise,
+}
+
+/// Clearance of one joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointClearance {
+    /// Joint, from 0.
+    pub joint: usize,
+    /// Radius of the disc in which the joint's centre may lie, m.
+    pub radial_m: f64,
+    /// Half width along the axis, m.
+    pub axial_m: f64,
+    /// Radius of the disc of the tilt, rad.
+    pub tilt_rad: f64,
+}
+
+/// Growth of the links with temperature.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Thermal {
+    /// Expansion of each link, base link first, 1/K.
+    pub expansion_per_k: Vec<f64>,
+    /// Largest rise of each link over the reference temperature, K.
+    pub rise_k: Vec<f64>,
+    /// Course over the session.
+    pub profile: ThermalProfile,
+}
+
+/// Course of the temperature over the session.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ThermalProfile {
+    /// At its largest rise all the time.
+    Constant,
+    /// Rising all the time.
+    WarmUp,
+    /// Rising, then falling back.
+    HeatAndCool,
+}
+
+/// Noise that the readings really have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Noise {
+    /// Normal, with the declared sigmas times a factor.
+    Declared {
+        /// 1: as declared.
+        factor: f64,
+    },
+    /// Uniform within ± the given half widths, the same for every axis.
+    Uniform {
+        /// Position, m.
+        position_m: f64,
+        /// Attitude (rotation vector), rad.
+        attitude_rad: f64,
+    },
+    /// None.
+    Off,
+}
