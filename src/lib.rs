@@ -12,3 +12,4 @@ pub mod quality;
 pub mod recording;
 pub mod scene;
 pub mod seed;
+pub mod self_collision;

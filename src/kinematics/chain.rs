@@ -305,6 +305,29 @@ impl ChainAt {
         }
     }
 
+    /// Visits every named frame, base first: its number, its axes (columns, in base) and its origin in base (m).
+    pub fn visit_frames(&self, joints: &[f64], mut visit: impl FnMut(usize, &[Vector3<f64>; 3], &Vector3<f64>)) {
+        let mut walker = Walker::at_base();
+        let mut number = 0;
+        for step in &self.steps {
+            walker.step(step, joints);
+            if matches!(step, Prepared::Frame) {
+                visit(number, &walker.axes, &walker.origin);
+                number += 1;
+            }
+        }
+    }
+
+    /// The tool's origin in base, m.
+    #[must_use]
+    pub fn end_point(&self, joints: &[f64]) -> Vector3<f64> {
+        let mut walker = Walker::at_base();
+        for step in &self.steps {
+            walker.step(step, joints);
+        }
+        walker.origin
+    }
+
     /// The frames in which the joints move, before their motion, each relative to the frame after the motion of the joint
     /// before it (the base for the first), and last the tool relative to the frame after the last joint's motion:
     /// `joint_count + 1` transforms. Their product with the joint motions in between is [`ChainAt::forward`].

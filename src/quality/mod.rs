@@ -1,5 +1,10 @@
 //! How good a set of configurations is: observability (O1–O6), globality (dispersion, evenness), and both together (O_C).
 
+pub mod evaluator;
+pub mod globality;
+pub mod observability;
+pub mod subspace;
+
 use serde::{Deserialize, Serialize};
 
 /// Every index of a set of configurations.

@@ -1,0 +1,152 @@
+//! All indexes of one set of configurations: what an optimiser calls thousands of times.
+
+use nalgebra::{DMatrix, Vector3};
+
+use super::Indexes;
+use super::globality::{WorkspaceGrid, dispersion};
+use super::observability::observability;
+use super::subspace::Subspace;
+use crate::arm::Arm;
+use crate::kinematics::ChainAt;
+use crate::scene::EvennessDomain;
+
+/// Evaluates sets of configurations of one arm at its nominal parameters.
+///
+/// The Jacobian is unscaled SI (metres and radians as they are), the paper's reading: O1–O3 depend on that choice.
+pub struct Evaluator {
+    chain: ChainAt,
+    subspace: Subspace,
+    grid: WorkspaceGrid,
+    /// 6 with attitude, 3 for positions only.
+    rows_per_pose: usize,
+    joint_count: usize,
+}
+
+/// Memory for the evaluations of one thread.
+#[derive(Clone, Debug, Default)]
+pub struct Scratch {
+    rows: Vec<f64>,
+    gram: Vec<f64>,
+    end_points: Vec<Vector3<f64>>,
+}
+
+impl Evaluator {
+    /// Prepares the evaluation: the identifiable subspace and the workspace grid.
+    #[must_use]
+    pub fn new(arm: &Arm, attitude: bool, domain: EvennessDomain, step_m: f64) -> Self {
+        Evaluator {
+            chain: arm.chain.at_nominal(),
+            subspace: Subspace::of_structure(arm, attitude),
+            grid: WorkspaceGrid::new(arm, domain, step_m),
+            rows_per_pose: if attitude { 6 } else { 3 },
+            joint_count: arm.joint_count(),
+        }
+    }
+
+    /// The identifiable subspace of the arm's structure.
+    #[must_use]
+    pub fn subspace(&self) -> &Subspace {
+        &self.subspace
+    }
+
+    /// The grid of the evenness.
+    #[must_use]
+    pub fn grid(&self) -> &WorkspaceGrid {
+        &self.grid
+    }
+
+    /// Indexes of `configurations`, one after the other (`m × joints`, rad or m), on the identifiable subspace: as many singular
+    /// values count as the arm's structure has independent parameters, and all indexes of observability are zero where the set
+    /// has fewer.
+    pub fn evaluate(&self, configurations: &[f64], scratch: &mut Scratch) -> Indexes {
+        let squares = self.squared_singular_values(configurations, scratch);
+        let rank = self.subspace.rank();
+        self.indexes(squares, rank, &scratch.end_points)
+    }
+
+    /// The same with every parameter counted, the plain reading of eqs. 15–17: zero wherever parameters are redundant.
+    pub fn evaluate_all_parameters(&self, configurations: &[f64], scratch: &mut Scratch) -> Indexes {
+        let squares = self.squared_singular_values(configurations, scratch);
+        let count = squares.len();
+        let mut indexes = self.indexes(squares, count, &scratch.end_points);
+        indexes.rank = self.subspace.rank();
+        indexes
+    }
+
+    /// End points of the last evaluated set.
+    #[must_use]
+    pub fn end_points<'a>(&self, scratch: &'a Scratch) -> &'a [Vector3<f64>] {
+        &scratch.end_points
+    }
+
+    fn indexes(&self, mut squares: Vec<f64>, count: usize, end_points: &[Vector3<f64>]) -> Indexes {
+        squares.sort_unstable_by(|a, b| b.total_cmp(a));
+        // Below this share of the largest, an eigenvalue of JᵀJ is rounding.
+        let floor = squares.first().copied().unwrap_or(0.0) * squares.len() as f64 * f64::EPSILON;
+        let values: Vec<f64> = squares[..count].iter().map(|square| if *square > floor { square.sqrt() } else { 0.0 }).collect();
+        let o = observability(&values);
+        let (d, u) = (dispersion(end_points), self.grid.evenness(end_points));
+        Indexes {
+            o1: o.o1,
+            o2: o.o2,
+            o3: o.o3,
+            o4: o.o4,
+            o5: o.o5,
+            o6: o.o6,
+            dispersion_m2: d,
+            evenness: u,
+            comprehensive: comprehensive(d, u, [o.o1, o.o2, o.o3]),
+            rank: values.iter().filter(|value| **value > 0.0).count(),
+        }
+    }
+
+    /// Eigenvalues of JᵀJ of the stacked Jacobian: squares of its singular values, in no order. Fills the scratch's end points.
+    fn squared_singular_values(&self, configurations: &[f64], scratch: &mut Scratch) -> Vec<f64> {
+        let n = self.chain.parameter_count();
+        scratch.rows.resize(6 * n, 0.0);
+        scratch.gram.clear();
+        scratch.gram.resize(n * n, 0.0);
+        scratch.end_points.clear();
+        for joints in configurations.chunks_exact(self.joint_count) {
+            let (_, end_point) = self.chain.jacobian_into(joints, &mut scratch.rows, n);
+            scratch.end_points.push(end_point);
+            accumulate(&scratch.rows[..self.rows_per_pose * n], n, &mut scratch.gram);
+        }
+        let gram = DMatrix::from_fn(n, n, |row, column| scratch.gram[row.max(column) * n + row.min(column)]);
+        gram.symmetric_eigenvalues().iter().copied().collect()
+    }
+}
+
+/// Adds `rowsᵀ rows` to the lower triangle of `gram` (row-major n × n).
+fn accumulate(rows: &[f64], n: usize, gram: &mut [f64]) {
+    if rows.len() == 6 * n {
+        let (r0, rest) = rows.split_at(n);
+        let (r1, rest) = rest.split_at(n);
+        let (r2, rest) = rest.split_at(n);
+        let (r3, rest) = rest.split_at(n);
+        let (r4, r5) = rest.split_at(n);
+        for i in 0..n {
+            let (c0, c1, c2, c3, c4, c5) = (r0[i], r1[i], r2[i], r3[i], r4[i], r5[i]);
+            let target = &mut gram[i * n..i * n + i + 1];
+            let sources = r0.iter().zip(r1).zip(r2).zip(r3).zip(r4).zip(r5);
+            for (sum, (((((a0, a1), a2), a3), a4), a5)) in target.iter_mut().zip(sources) {
+                *sum += ((c0 * a0 + c1 * a1) + (c2 * a2 + c3 * a3)) + (c4 * a4 + c5 * a5);
+            }
+        }
+    } else {
+        for row in rows.chunks_exact(n) {
+            for i in 0..n {
+                for (sum, value) in gram[i * n..i * n + i + 1].iter_mut().zip(row) {
+                    *sum += row[i] * value;
+                }
+            }
+        }
+    }
+}
+
+/// Comprehensive quality index O_C (eq. 27): at most 5.
+#[must_use]
+pub fn comprehensive(dispersion: f64, evenness: f64, o: [f64; 3]) -> f64 {
+    let sum = libm::atan(dispersion) + libm::atan(evenness) + o.iter().map(|index| libm::atan(*index)).sum::<f64>();
+    std::f64::consts::FRAC_2_PI * sum
+}

@@ -1,0 +1,235 @@
+//! Whether an arm touches itself or its cell in a configuration. The only module, besides the physics, that sees parry.
+
+use nalgebra::Vector3;
+use parry3d::math::{Pose as ParryPose, Rotation as ParryRotation, Vector as ParryVector};
+use parry3d::query::details::closest_points_segment_segment_with_locations_nD as closest_on_segments;
+use parry3d::query::intersection_test;
+use parry3d::shape::{Capsule, Cuboid, Cylinder, SegmentPointLocation, Shape as ParryShape};
+
+use crate::arm::{Arm, Geometry, Shape};
+use crate::frames::Pose;
+use crate::kinematics::ChainAt;
+
+/// Checks configurations of one arm. Links joined by a joint are never checked against each other, nor are the pairs that the arm
+/// lists as uncollidable; every other pair of shapes is.
+pub struct CollisionCheck {
+    chain: ChainAt,
+    /// Bodies: links that have shapes, by frame number, then the fixtures in base.
+    bodies: Vec<Body>,
+    /// Pairs of bodies to check, those that touch most often first.
+    pairs: Vec<(usize, usize)>,
+}
+
+struct Body {
+    name: String,
+    /// Number of the chain's frame that carries the body; `None` for a fixture.
+    frame: Option<usize>,
+    shapes: Vec<Prepared>,
+}
+
+struct Prepared {
+    /// Centre and radius of a ball around the shape, in the body's frame.
+    centre: Vector3<f64>,
+    radius: f64,
+    kind: Kind,
+}
+
+enum Kind {
+    /// A swept ball: the ends of its segment in the body's frame. Balls have both ends in one point.
+    Round {
+        a: Vector3<f64>,
+        b: Vector3<f64>,
+        radius: f64,
+    },
+    Other {
+        body_from_shape: Pose,
+        shape: Box<dyn ParryShape>,
+    },
+}
+
+/// Two bodies that touch.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Contact {
+    /// A link.
+    pub first: String,
+    /// Another link or a fixture.
+    pub second: String,
+}
+
+/// Memory for the checks of one thread.
+#[derive(Clone, Debug, Default)]
+pub struct Scratch {
+    frames: Vec<([Vector3<f64>; 3], Vector3<f64>)>,
+}
+
+impl CollisionCheck {
+    /// Prepares the check of `arm` at its nominal parameters.
+    #[must_use]
+    pub fn new(arm: &Arm) -> Self {
+        let names = arm.chain.frame_names();
+        let mut bodies = Vec::new();
+        let mut link_of_body = Vec::new();
+        for (index, link) in arm.links.iter().enumerate() {
+            if link.shapes.is_empty() {
+                continue;
+            }
+            let frame = names.iter().position(|name| *name == link.name);
+            bodies.push(Body { name: link.name.clone(), frame, shapes: link.shapes.iter().map(prepare).collect() });
+            link_of_body.push(index);
+        }
+        let mut pairs = Vec::new();
+        // Distant links meet more often than near ones, so that a colliding configuration is known soon.
+        for distance in (2..arm.links.len()).rev() {
+            for (first, first_link) in link_of_body.iter().enumerate() {
+                for (second, second_link) in link_of_body.iter().enumerate().skip(first + 1) {
+                    if second_link - first_link == distance && !arm.uncollidable.contains(&(*first_link, *second_link)) {
+                        pairs.push((first, second));
+                    }
+                }
+            }
+        }
+        for fixture in &arm.fixtures {
+            let body = bodies.len();
+            let frame = names.iter().position(|name| *name == "base_link").filter(|_| names.first() == Some(&"world"));
+            bodies.push(Body { name: fixture.name.clone(), frame, shapes: vec![prepare(&fixture.shape)] });
+            for (first, link) in link_of_body.iter().enumerate() {
+                if !fixture.may_touch.contains(link) {
+                    pairs.push((first, body));
+                }
+            }
+        }
+        CollisionCheck { chain: arm.chain.at_nominal(), bodies, pairs }
+    }
+
+    /// Whether any checked pair touches at `joints` (rad or m).
+    #[must_use]
+    pub fn collides(&self, joints: &[f64], scratch: &mut Scratch) -> bool {
+        self.first_pair(joints, scratch).is_some()
+    }
+
+    /// The first checked pair that touches at `joints`.
+    #[must_use]
+    pub fn contact(&self, joints: &[f64]) -> Option<Contact> {
+        self.first_pair(joints, &mut Scratch::default())
+            .map(|(first, second)| Contact { first: self.bodies[first].name.clone(), second: self.bodies[second].name.clone() })
+    }
+
+    fn first_pair(&self, joints: &[f64], scratch: &mut Scratch) -> Option<(usize, usize)> {
+        let frames = &mut scratch.frames;
+        frames.clear();
+        self.chain.visit_frames(joints, |_, axes, origin| frames.push((*axes, *origin)));
+        self.pairs.iter().copied().find(|(first, second)| touch(&self.bodies[*first], &self.bodies[*second], frames))
+    }
+}
+
+type Frame = ([Vector3<f64>; 3], Vector3<f64>);
+
+fn frame_of(body: &Body, frames: &[Frame]) -> Frame {
+    body.frame.map_or(([Vector3::x(), Vector3::y(), Vector3::z()], Vector3::zeros()), |frame| frames[frame])
+}
+
+fn to_base((axes, origin): &Frame, point: &Vector3<f64>) -> Vector3<f64> {
+    origin + axes[0] * point.x + axes[1] * point.y + axes[2] * point.z
+}
+
+fn touch(first: &Body, second: &Body, frames: &[Frame]) -> bool {
+    let (first_frame, second_frame) = (frame_of(first, frames), frame_of(second, frames));
+    first.shapes.iter().any(|one| {
+        let one_centre = to_base(&first_frame, &one.centre);
+        second.shapes.iter().any(|other| {
+            let reach = one.radius + other.radius;
+            (to_base(&second_frame, &other.centre) - one_centre).norm_squared() <= reach * reach
+                && shapes_touch(one, &first_frame, other, &second_frame)
+        })
+    })
+}
+
+fn shapes_touch(one: &Prepared, one_frame: &Frame, other: &Prepared, other_frame: &Frame) -> bool {
+    if let (Kind::Round { a, b, radius }, Kind::Round { a: c, b: d, radius: other_radius }) = (&one.kind, &other.kind) {
+        let (a, b) = (vector(&to_base(one_frame, a)), vector(&to_base(one_frame, b)));
+        let (c, d) = (vector(&to_base(other_frame, c)), vector(&to_base(other_frame, d)));
+        let (on_one, on_other) = closest_on_segments((&a, &b), (&c, &d));
+        let reach = radius + other_radius;
+        return (at(&on_one, a, b) - at(&on_other, c, d)).length_squared() <= reach * reach;
+    }
+    if apart_of_box(one, one_frame, other, other_frame) || apart_of_box(other, other_frame, one, one_frame) {
+        return false;
+    }
+    let round;
+    let (one_pose, one_shape) = match &one.kind {
+        Kind::Round { a, b, radius } => {
+            round = Capsule::new(vector(a), vector(b), *radius);
+            (parry_pose(one_frame, &Pose::identity()), &round as &dyn ParryShape)
+        }
+        Kind::Other { body_from_shape, shape } => (parry_pose(one_frame, body_from_shape), &**shape),
+    };
+    let other_round;
+    let (other_pose, other_shape) = match &other.kind {
+        Kind::Round { a, b, radius } => {
+            other_round = Capsule::new(vector(a), vector(b), *radius);
+            (parry_pose(other_frame, &Pose::identity()), &other_round as &dyn ParryShape)
+        }
+        Kind::Other { body_from_shape, shape } => (parry_pose(other_frame, body_from_shape), &**shape),
+    };
+    // Every pair of these convex shapes is supported; where parry could not tell, the pair counts as touching.
+    intersection_test(&one_pose, one_shape, &other_pose, other_shape).map_or(true, |answer| answer.intersecting)
+}
+
+/// Whether a swept ball lies beyond one face of a box: a cheap test that spares most of the calls for a floor.
+fn apart_of_box(round: &Prepared, round_frame: &Frame, cuboid: &Prepared, cuboid_frame: &Frame) -> bool {
+    let (Kind::Round { a, b, radius }, Kind::Other { body_from_shape, shape }) = (&round.kind, &cuboid.kind) else {
+        return false;
+    };
+    let Some(cuboid) = shape.as_cuboid() else {
+        return false;
+    };
+    let in_box = |point: &Vector3<f64>| {
+        let from_origin = to_base(round_frame, point) - cuboid_frame.1;
+        let in_body = Vector3::from(cuboid_frame.0.map(|axis| axis.dot(&from_origin)));
+        body_from_shape.inverse_transform_point(&in_body.into()).coords
+    };
+    let (a, b) = (in_box(a), in_box(b));
+    let half = [cuboid.half_extents.x, cuboid.half_extents.y, cuboid.half_extents.z];
+    (0..3).any(|axis| a[axis].min(b[axis]) - radius > half[axis] || a[axis].max(b[axis]) + radius < -half[axis])
+}
+
+fn at(location: &SegmentPointLocation, a: ParryVector, b: ParryVector) -> ParryVector {
+    let [first, second] = location.barycentric_coordinates();
+    a * first + b * second
+}
+
+fn vector(vector: &Vector3<f64>) -> ParryVector {
+    ParryVector::new(vector.x, vector.y, vector.z)
+}
+
+fn parry_pose(frame: &Frame, body_from_shape: &Pose) -> ParryPose {
+    let axes = nalgebra::Matrix3::from_columns(&frame.0);
+    let pose = crate::frames::pose_from_parts(&axes, &frame.1) * body_from_shape;
+    let q = pose.rotation.quaternion();
+    ParryPose::from_parts(vector(&pose.translation.vector), ParryRotation::from_xyzw(q.i, q.j, q.k, q.w))
+}
+
+fn prepare(shape: &Shape) -> Prepared {
+    let pose = shape.link_from_shape;
+    let centre = pose.translation.vector;
+    let along = pose.rotation * Vector3::z();
+    match shape.geometry {
+        Geometry::Capsule { half_length, radius } => Prepared {
+            centre,
+            radius: half_length + radius,
+            kind: Kind::Round { a: centre - along * half_length, b: centre + along * half_length, radius },
+        },
+        Geometry::Sphere { radius } => Prepared { centre, radius, kind: Kind::Round { a: centre, b: centre, radius } },
+        Geometry::Cylinder { half_length, radius } => {
+            // parry's cylinder stands along y.
+            let z_from_y = nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
+            let body_from_shape = Pose::from_parts(pose.translation, pose.rotation * z_from_y);
+            let shape: Box<dyn ParryShape> = Box::new(Cylinder::new(half_length, radius));
+            Prepared { centre, radius: half_length.hypot(radius), kind: Kind::Other { body_from_shape, shape } }
+        }
+        Geometry::Box { half_extents: [x, y, z] } => {
+            let shape: Box<dyn ParryShape> = Box::new(Cuboid::new(ParryVector::new(x, y, z)));
+            Prepared { centre, radius: Vector3::new(x, y, z).norm(), kind: Kind::Other { body_from_shape: pose, shape } }
+        }
+    }
+}
