@@ -1,3 +1,6 @@
 //! From measurements to parameters, with what can be known about them.
 
+pub mod least_squares;
 pub mod outcome;
+
+pub use least_squares::{IdentificationError, identify};

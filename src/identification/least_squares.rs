@@ -1,0 +1,492 @@
+//! Gauss–Newton / Levenberg–Marquardt on the identifiable subspace (eqs. 5–7, on the parameters that can be told apart).
+
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3, Vector6};
+use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+
+use super::outcome::{Combination, Errors, Identification, ParameterEstimate, Residual, Summary};
+use crate::arm::Arm;
+use crate::frames::{Pose, pose_error};
+use crate::kinematics::ChainAt;
+use crate::measurement::{Measurement, Sensor};
+use crate::quality::subspace::{Subspace, preference};
+use crate::scene::Weights;
+
+/// Steps after which a fit that has not settled is given up.
+const MAX_STEPS: usize = 60;
+/// The fit has converged when a step changes the weighted residuals by less than this share of their length, or of one sigma.
+const STEP_TOLERANCE: f64 = 1e-9;
+/// Below this probability of the residuals under the declared noise, the noise is taken to be larger than declared.
+const DECLARED_NOISE_REJECTED: f64 = 1e-3;
+
+/// An identification that cannot be made.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum IdentificationError {
+    /// Too few equations.
+    #[error(
+        "{equations} measured numbers ({poses} configurations to fit) cannot determine {rank} independent parameters; measure at \
+         least {needed} configurations"
+    )]
+    TooFew {
+        /// Configurations to fit.
+        poses: usize,
+        /// Residual components.
+        equations: usize,
+        /// Dimension of the identifiable subspace.
+        rank: usize,
+        /// Smallest number of configurations.
+        needed: usize,
+    },
+    /// A measurement does not fit the arm.
+    #[error("measurement {index} has {found} joint readings, the arm has {expected} joints")]
+    JointCount {
+        /// Index of the measurement.
+        index: usize,
+        /// Readings.
+        found: usize,
+        /// Joints.
+        expected: usize,
+    },
+    /// Weighting by noise that is declared as zero.
+    #[error(
+        "the declared {what} noise is zero, so that residuals cannot be weighted by it: declare the sensor's noise, or use \
+         weights = \"unit\""
+    )]
+    NoNoise {
+        /// `position` or `attitude`.
+        what: &'static str,
+    },
+}
+
+/// Identifies the geometric parameters of `arm` from `measurements` with [`Role::Fit`](crate::measurement::Role), and reports the
+/// errors of both models on these and, apart, on the held-out ones.
+///
+/// Residuals are measured minus predicted pose ([`pose_error`]). With [`Weights::Noise`] each is divided by its declared sigma;
+/// with [`Weights::Unit`] metres and radians count alike and the standard errors follow from the declared noise all the same.
+/// Where the residuals are larger than the declared noise allows (chi-square, 0.1 %), standard errors grow by the residual scale
+/// and the intervals become Student's; the notes then say so.
+///
+/// # Errors
+/// If there are too few measurements or they do not fit the arm. A fit that does not converge is no error: the outcome says so.
+pub fn identify(
+    arm: &Arm,
+    sensor: &Sensor,
+    weights: Weights,
+    measurements: &[Measurement],
+) -> Result<Identification, IdentificationError> {
+    use crate::measurement::Role;
+    for measurement in measurements {
+        if measurement.joints.len() != arm.joint_count() {
+            return Err(IdentificationError::JointCount {
+                index: measurement.index,
+                found: measurement.joints.len(),
+                expected: arm.joint_count(),
+            });
+        }
+    }
+    let of = |role| measurements.iter().filter(|measurement| measurement.role == role).collect::<Vec<_>>();
+    let (fit, held_out) = (of(Role::Fit), of(Role::HeldOut));
+    let problem = Problem::new(arm, sensor, weights, &fit)?;
+    let nominal = arm.chain.nominal();
+
+    let start = problem.linearise(&nominal);
+    let subspace = Subspace::reveal(&start.jacobian, &preference(arm));
+    let rank = subspace.rank();
+    let equations = problem.equations();
+    if equations < rank || fit.is_empty() || rank == 0 {
+        let structural = Subspace::of_structure(arm, problem.rows_per_pose == 6).rank();
+        let needed = structural.div_ceil(problem.rows_per_pose);
+        return Err(IdentificationError::TooFew { poses: fit.len(), equations, rank: structural, needed });
+    }
+
+    let solution = solve(&problem, &subspace, nominal.clone(), start);
+    let mut notes = Vec::new();
+    let freedom = equations - rank;
+    let noise = problem.noise_scale(&solution.values);
+    let scale = if freedom > 0 { (noise.sum_of_squares / freedom as f64).sqrt() } else { 1.0 };
+    let p_value = match (freedom, ChiSquared::new(freedom as f64)) {
+        (1.., Ok(distribution)) => distribution.sf(noise.sum_of_squares),
+        _ => 1.0,
+    };
+    let inflated = noise.known && p_value < DECLARED_NOISE_REJECTED;
+    if inflated {
+        notes.push(format!(
+            "residuals are {scale:.2} times what the declared noise allows (chi-square p = {p_value:.1e}): something is not \
+             modelled; standard errors are scaled by {scale:.2}, and cannot show a bias"
+        ));
+    }
+    if freedom == 0 {
+        notes.push("as many equations as parameters: nothing is left to tell how good the fit is".to_owned());
+    }
+    let covariance = problem.covariance(&solution.jacobian, &subspace);
+    let quantile = match StudentsT::new(0.0, 1.0, freedom.max(1) as f64) {
+        Ok(distribution) if inflated => distribution.inverse_cdf(0.975),
+        _ => 1.959_963_984_540_054,
+    };
+    let factor = if inflated { scale } else { 1.0 };
+    let standard_error = |position: usize| factor * covariance[(position, position)].max(0.0).sqrt();
+
+    let parameters = arm
+        .chain
+        .parameters
+        .iter()
+        .enumerate()
+        .map(|(column, parameter)| {
+            let position = subspace.independent.binary_search(&column).ok();
+            ParameterEstimate {
+                name: parameter.name.clone(),
+                nominal: parameter.nominal,
+                identified: solution.values[column],
+                standard_error: position.map(standard_error),
+                unit: parameter.quantity.unit().to_owned(),
+                dropped: position.is_none(),
+            }
+        })
+        .collect();
+    let combinations = subspace
+        .independent
+        .iter()
+        .enumerate()
+        .map(|(position, &column)| {
+            let estimate = solution.values[column] - nominal[column];
+            let error = standard_error(position);
+            Combination {
+                name: arm.chain.parameters[column].name.clone(),
+                expression: expression(arm, &subspace, position),
+                estimate,
+                standard_error: error,
+                interval95: [estimate - quantile * error, estimate + quantile * error],
+                unit: arm.chain.parameters[column].quantity.unit().to_owned(),
+            }
+        })
+        .collect();
+
+    let (at_nominal, at_identified) = (arm.chain.at(&nominal), arm.chain.at(&solution.values));
+    let residuals: Vec<Residual> = measurements
+        .iter()
+        .map(|measurement| Residual {
+            index: measurement.index,
+            position_m: measurement.position_m,
+            nominal: residual(measurement, &at_nominal).into(),
+            identified: residual(measurement, &at_identified).into(),
+        })
+        .collect();
+    Ok(Identification {
+        converged: solution.converged,
+        reason: solution.reason,
+        iterations: solution.steps,
+        rank,
+        equations,
+        residual_scale: scale,
+        parameters,
+        combinations,
+        nominal: errors(&fit, &at_nominal),
+        fitted: errors(&fit, &at_identified),
+        held_out: (!held_out.is_empty()).then(|| errors(&held_out, &at_identified)),
+        held_out_nominal: (!held_out.is_empty()).then(|| errors(&held_out, &at_nominal)),
+        residuals,
+        notes,
+    })
+}
+
+/// Errors of the model `chain` on `measurements`.
+#[must_use]
+pub fn errors(measurements: &[&Measurement], chain: &ChainAt) -> Errors {
+    let residuals: Vec<Vector6<f64>> = measurements.iter().map(|measurement| residual(measurement, chain)).collect();
+    let attitude = measurements.iter().all(|measurement| measurement.attitude_xyzw.is_some());
+    Errors {
+        count: measurements.len(),
+        position_m: summary(residuals.iter().map(|residual| residual.fixed_rows::<3>(0).norm())),
+        rotation_rad: attitude.then(|| summary(residuals.iter().map(|residual| residual.fixed_rows::<3>(3).norm()))),
+    }
+}
+
+/// Smallest, mean, RMS and largest of `values`; zeros if there are none.
+#[must_use]
+pub fn summary(values: impl Iterator<Item = f64>) -> Summary {
+    let (mut count, mut min, mut max, mut sum, mut squares) = (0usize, f64::INFINITY, 0.0f64, 0.0, 0.0);
+    for value in values {
+        count += 1;
+        min = min.min(value);
+        max = max.max(value);
+        sum += value;
+        squares += value * value;
+    }
+    if count == 0 {
+        return Summary { min: 0.0, mean: 0.0, rms: 0.0, max: 0.0 };
+    }
+    Summary { min, mean: sum / count as f64, rms: (squares / count as f64).sqrt(), max }
+}
+
+/// Measured minus predicted pose; the rotation part is zero where no attitude was measured.
+fn residual(measurement: &Measurement, chain: &ChainAt) -> Vector6<f64> {
+    let predicted = chain.forward(&measurement.joints);
+    match measurement.attitude() {
+        Some(attitude) => pose_error(&Pose::from_parts(measurement.position().into(), attitude), &predicted),
+        None => {
+            let difference = measurement.position().coords - predicted.translation.vector;
+            Vector6::new(difference.x, difference.y, difference.z, 0.0, 0.0, 0.0)
+        }
+    }
+}
+
+struct Problem<'a> {
+    arm: &'a Arm,
+    measurements: &'a [&'a Measurement],
+    rows_per_pose: usize,
+    /// Weight and declared sigma of the position and the attitude rows of each measurement.
+    rows: Vec<RowWeights>,
+}
+
+#[derive(Clone, Copy)]
+struct RowWeights {
+    weight: [f64; 2],
+    sigma: [f64; 2],
+}
+
+struct Linearised {
+    /// Weighted residuals, measured minus predicted.
+    residuals: DVector<f64>,
+    /// Weighted change of the prediction per parameter (all columns).
+    jacobian: DMatrix<f64>,
+}
+
+struct NoiseScale {
+    sum_of_squares: f64,
+    known: bool,
+}
+
+impl<'a> Problem<'a> {
+    fn new(
+        arm: &'a Arm,
+        sensor: &Sensor,
+        weights: Weights,
+        measurements: &'a [&'a Measurement],
+    ) -> Result<Self, IdentificationError> {
+        // Mixed data are fitted as what all of them have.
+        let attitude =
+            sensor.attitude_sigma_rad.is_some() && measurements.iter().all(|measurement| measurement.attitude_xyzw.is_some());
+        let rows = measurements
+            .iter()
+            .map(|measurement| {
+                let sigma = [
+                    sensor.position_sigma_at(&measurement.position().coords),
+                    if attitude { sensor.attitude_sigma_rad.unwrap_or(0.0) } else { 1.0 },
+                ];
+                let weight = match weights {
+                    Weights::Unit => [1.0, 1.0],
+                    Weights::Noise => {
+                        for (sigma, what) in sigma.iter().zip(["position", "attitude"]) {
+                            if *sigma <= 0.0 {
+                                return Err(IdentificationError::NoNoise { what });
+                            }
+                        }
+                        sigma.map(|sigma| 1.0 / sigma)
+                    }
+                };
+                Ok(RowWeights { weight, sigma })
+            })
+            .collect::<Result<_, _>>()?;
+        Ok(Problem { arm, measurements, rows_per_pose: if attitude { 6 } else { 3 }, rows })
+    }
+
+    fn equations(&self) -> usize {
+        self.rows_per_pose * self.measurements.len()
+    }
+
+    fn linearise(&self, values: &[f64]) -> Linearised {
+        let chain = self.arm.chain.at(values);
+        let (n, per_pose) = (chain.parameter_count(), self.rows_per_pose);
+        let mut residuals = DVector::zeros(self.equations());
+        // Built transposed: each pose then fills consecutive memory.
+        let mut transposed = DMatrix::zeros(n, self.equations());
+        let mut rows = vec![0.0; 6 * n];
+        for (index, (measurement, row)) in self.measurements.iter().zip(&self.rows).enumerate() {
+            let (axes, origin) = chain.jacobian_into(&measurement.joints, &mut rows, n);
+            let predicted = crate::frames::pose_from_parts(&axes, &origin);
+            let error = match measurement.attitude() {
+                Some(attitude) => pose_error(&Pose::from_parts(measurement.position().into(), attitude), &predicted),
+                None => {
+                    let difference = measurement.position().coords - origin;
+                    Vector6::new(difference.x, difference.y, difference.z, 0.0, 0.0, 0.0)
+                }
+            };
+            if per_pose == 6 {
+                turn_to_residual(&mut rows[3 * n..], n, &error.fixed_rows::<3>(3).into_owned());
+            }
+            for component in 0..per_pose {
+                let weight = row.weight[component / 3];
+                let at = index * per_pose + component;
+                residuals[at] = weight * error[component];
+                for (entry, value) in transposed.column_mut(at).iter_mut().zip(&rows[component * n..(component + 1) * n]) {
+                    *entry = weight * value;
+                }
+            }
+        }
+        Linearised { residuals, jacobian: transposed.transpose() }
+    }
+
+    /// Sum of squares of the residuals over their declared sigmas, of the components whose noise is declared.
+    fn noise_scale(&self, values: &[f64]) -> NoiseScale {
+        let chain = self.arm.chain.at(values);
+        let mut sum_of_squares = 0.0;
+        let mut known = true;
+        for (measurement, row) in self.measurements.iter().zip(&self.rows) {
+            let error = residual(measurement, &chain);
+            for component in 0..self.rows_per_pose {
+                let sigma = row.sigma[component / 3];
+                if sigma > 0.0 {
+                    sum_of_squares += (error[component] / sigma).powi(2);
+                } else {
+                    known = false;
+                }
+            }
+        }
+        NoiseScale { sum_of_squares, known }
+    }
+
+    /// Covariance of the independent parameters from the declared noise: `A Jᵀ W Σ W J A` with `A = (Jᵀ J)⁻¹` of the weighted
+    /// Jacobian, which is A itself where the weights are the sigmas.
+    fn covariance(&self, jacobian: &DMatrix<f64>, subspace: &Subspace) -> DMatrix<f64> {
+        let j = jacobian.select_columns(&subspace.independent);
+        let rank = subspace.rank();
+        let Some(inverse) = scaled_inverse(&(j.transpose() * &j)) else {
+            return DMatrix::from_element(rank, rank, f64::NAN);
+        };
+        let mut scaled = j.clone();
+        for (index, mut row) in scaled.row_iter_mut().enumerate() {
+            let weights = self.rows[index / self.rows_per_pose];
+            let part = index % self.rows_per_pose / 3;
+            row *= weights.weight[part] * weights.sigma[part];
+        }
+        &inverse * (scaled.transpose() * &scaled) * &inverse
+    }
+}
+
+/// Inverse of a positive definite matrix whose rows have different units.
+fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let scale = matrix.diagonal().map(|value| 1.0 / value.sqrt());
+    let scaled =
+        DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |row, column| matrix[(row, column)] * scale[row] * scale[column]);
+    let inverse = Cholesky::new(scaled)?.inverse();
+    Some(DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |row, column| inverse[(row, column)] * scale[row] * scale[column]))
+}
+
+/// Turns the rotation rows of a Jacobian (change of the predicted attitude) into the change of the rotation residual `error`:
+/// the inverse right Jacobian of the rotation group, exact however large the residual is.
+fn turn_to_residual(rows: &mut [f64], n: usize, error: &Vector3<f64>) {
+    let angle = error.norm();
+    if angle < 1e-8 {
+        return;
+    }
+    let cross = error.cross_matrix();
+    let (sine, cosine) = libm::sincos(angle);
+    let factor = 1.0 / (angle * angle) - (1.0 + cosine) / (2.0 * angle * sine);
+    let turn = Matrix3::identity() + cross * 0.5 + cross * cross * factor;
+    for column in 0..n {
+        let turned = turn * Vector3::new(rows[column], rows[n + column], rows[2 * n + column]);
+        rows[column] = turned.x;
+        rows[n + column] = turned.y;
+        rows[2 * n + column] = turned.z;
+    }
+}
+
+struct Solution {
+    values: Vec<f64>,
+    jacobian: DMatrix<f64>,
+    converged: bool,
+    reason: String,
+    steps: usize,
+}
+
+fn solve(problem: &Problem<'_>, subspace: &Subspace, start: Vec<f64>, linearised: Linearised) -> Solution {
+    let mut values = start;
+    let mut here = linearised;
+    let mut cost = here.residuals.norm_squared();
+    let mut damping = 0.0;
+    let done = |values, here: Linearised, converged, reason: String, steps| Solution {
+        values,
+        jacobian: here.jacobian,
+        converged,
+        reason,
+        steps,
+    };
+    for step_number in 1..=MAX_STEPS {
+        let jacobian = here.jacobian.select_columns(&subspace.independent);
+        let Some(step) = step(&jacobian, &here.residuals, damping) else {
+            return done(values, here, false, "the equations became singular".to_owned(), step_number);
+        };
+        let change = (&jacobian * &step).norm();
+        let mut trial = values.clone();
+        for (position, &column) in subspace.independent.iter().enumerate() {
+            trial[column] += step[position];
+        }
+        let there = problem.linearise(&trial);
+        let trial_cost = there.residuals.norm_squared();
+        let settled = change <= STEP_TOLERANCE * cost.sqrt().max(problem.one_sigma());
+        if trial_cost.is_finite() && (trial_cost <= cost || settled) {
+            values = trial;
+            here = there;
+            cost = trial_cost;
+            damping = if damping < 1e-9 { 0.0 } else { damping * 0.1 };
+            if settled && damping == 0.0 {
+                let reason = "the last step changed the predictions by less than a billionth of the residuals".to_owned();
+                return done(values, here, true, reason, step_number);
+            }
+        } else {
+            damping = if damping == 0.0 { 1e-4 } else { damping * 10.0 };
+            if damping > 1e12 {
+                return done(values, here, false, "no step makes the residuals smaller".to_owned(), step_number);
+            }
+        }
+    }
+    done(values, here, false, format!("not settled after {MAX_STEPS} steps"), MAX_STEPS)
+}
+
+impl Problem<'_> {
+    /// Length of a weighted residual vector in which one component is off by one declared sigma: what counts as nothing.
+    fn one_sigma(&self) -> f64 {
+        self.rows.first().map_or(0.0, |row| row.weight[0] * row.sigma[0])
+    }
+}
+
+/// The step that minimises the linearised residuals, by QR of the column-scaled Jacobian, damped after Levenberg and Marquardt.
+fn step(jacobian: &DMatrix<f64>, residuals: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
+    let (rows, columns) = jacobian.shape();
+    let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
+    let extra = if damping > 0.0 { columns } else { 0 };
+    let mut matrix = DMatrix::zeros(rows + extra, columns);
+    for (column, norm) in norms.iter().enumerate() {
+        if !norm.is_finite() || *norm == 0.0 {
+            return None;
+        }
+        matrix.view_mut((0, column), (rows, 1)).copy_from(&(jacobian.column(column) / *norm));
+        if damping > 0.0 {
+            matrix[(rows + column, column)] = damping.sqrt();
+        }
+    }
+    let mut right = DVector::zeros(rows + extra);
+    right.rows_mut(0, rows).copy_from(residuals);
+    let qr = matrix.qr();
+    qr.q_tr_mul(&mut right);
+    let mut step = right.rows(0, columns).into_owned();
+    if !qr.unpack_r().solve_upper_triangular_mut(&mut step) {
+        return None;
+    }
+    for (value, norm) in step.iter_mut().zip(&norms) {
+        *value /= norm;
+    }
+    step.iter().all(|value| value.is_finite()).then_some(step)
+}
+
+/// The combination behind independent parameter number `position`, in words.
+fn expression(arm: &Arm, subspace: &Subspace, position: usize) -> String {
+    let mut text = arm.chain.parameters[subspace.independent[position]].name.clone();
+    for (other, &column) in subspace.dropped.iter().enumerate() {
+        let share = subspace.share[(position, other)];
+        if share.abs() > 1e-6 {
+            let sign = if share < 0.0 { '−' } else { '+' };
+            text.push_str(&format!(" {sign} {:.4}·{}", share.abs(), arm.chain.parameters[column].name));
+        }
+    }
+    text
+}
