@@ -5,4 +5,5 @@
 pub mod arm;
 pub mod frames;
 pub mod kinematics;
+pub mod physics;
 pub mod seed;
