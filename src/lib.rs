@@ -3,11 +3,13 @@
 //! Modules in reading order; the README's architecture section says how a datum travels through them.
 
 pub mod arm;
+pub mod cell;
 pub mod design;
 pub mod frames;
 pub mod identification;
 pub mod kinematics;
 pub mod measurement;
+pub mod physics;
 pub mod quality;
 pub mod recording;
 pub mod scene;

@@ -1,0 +1,157 @@
+//! Measuring: every configuration settles in the physics, then the sensor reads it.
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::truth::{self, TruePose, Truth};
+use crate::frames::{Pose, rotation_from_vector};
+use crate::measurement::{Measurement, Role, Sensor};
+use crate::physics::{PhysicalArm, PhysicsError, Settled, Settling};
+use crate::recording::event::{Event, Listener, ListenerError};
+use crate::scene::{Injected, Noise, Scene};
+use crate::seed::{Stream, stream};
+
+/// Configurations that settle side by side before they are told: bounds memory, and what a killed run loses.
+const BATCH: usize = 64;
+
+/// Measuring failed.
+#[derive(Debug, thiserror::Error)]
+pub enum MeasureError {
+    /// The true arm cannot be simulated.
+    #[error(transparent)]
+    Physics(#[from] PhysicsError),
+    /// Whoever records or shows the run failed.
+    #[error(transparent)]
+    Listener(#[from] ListenerError),
+}
+
+/// A configuration in the order of measuring.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Planned {
+    /// Same number, same configuration.
+    pub pose_id: usize,
+    /// For fitting or for verification.
+    pub role: Role,
+    /// Commanded joint coordinates, rad or m.
+    pub joints: Vec<f64>,
+}
+
+/// The order of measuring: chosen and held-out configurations shuffled, so that neither sees only one part of a drift.
+#[must_use]
+pub fn plan(scene: &Scene, chosen: &[Vec<f64>], held_out: &[Vec<f64>]) -> Vec<Planned> {
+    let of = |role, configurations: &[Vec<f64>], first: usize| {
+        let planned = configurations.iter().enumerate();
+        planned.map(|(index, joints)| Planned { pose_id: first + index, role, joints: joints.clone() }).collect::<Vec<_>>()
+    };
+    let mut planned = of(Role::Fit, chosen, 0);
+    planned.extend(of(Role::HeldOut, held_out, chosen.len()));
+    stream(scene.seed, "plan/order").shuffle(&mut planned);
+    planned
+}
+
+/// Measures `planned` on the true arm that `injected` makes of the scene's, telling `listener` every measurement.
+///
+/// Noise is drawn from streams of the hidden seed, in the order of measuring; the physics of a pose depends on nothing but the pose.
+/// Neither depends on the number of threads.
+///
+/// # Errors
+/// If the arm cannot be simulated (links without mass), or the listener fails.
+pub fn measure(
+    scene: &Scene,
+    injected: &Injected,
+    planned: &[Planned],
+    listener: &mut dyn Listener,
+) -> Result<(Vec<Measurement>, Truth), MeasureError> {
+    let arm = &scene.arm;
+    let parameters = truth::parameters(arm, injected, scene.seed);
+    let values: Vec<f64> = parameters.iter().map(|parameter| parameter.true_value).collect();
+    let clearances = truth::clearances(arm, injected);
+    let new_arm = || PhysicalArm::new(arm, &values, &clearances, Settling::default());
+    // Refuses a bad arm before anything is told.
+    drop(new_arm()?);
+    let mut sensor = SimulatedSensor::new(&scene.sensor, injected, scene.seed);
+
+    let mut measurements = Vec::with_capacity(planned.len());
+    let mut poses = Vec::with_capacity(planned.len());
+    let last = planned.len().saturating_sub(1).max(1) as f64;
+    for (batch, chunk) in planned.chunks(BATCH).enumerate() {
+        let settled: Vec<(Settled, Vec<f64>)> = chunk
+            .par_iter()
+            .enumerate()
+            .map_init(new_arm, |physical, (offset, planned)| {
+                let rise = truth::temperature_rise(arm, injected, (batch * BATCH + offset) as f64 / last);
+                match physical {
+                    Ok(physical) => Ok((physical.settle(&planned.joints, &truth::growth(injected, &rise)), rise)),
+                    Err(error) => Err(error.clone()),
+                }
+            })
+            .collect::<Result<_, _>>()?;
+        for (offset, ((settled, rise), planned)) in settled.into_iter().zip(chunk).enumerate() {
+            let index = batch * BATCH + offset;
+            let exact = planned.role == Role::HeldOut && scene.plan.held_out_exact;
+            let (pose, temperatures_c) = sensor.read(&settled.base_from_tool, exact, &rise, scene.plan.reference_temperature_c);
+            let q = pose.rotation.quaternion();
+            let measurement = Measurement {
+                index,
+                pose_id: planned.pose_id,
+                role: planned.role,
+                time_s: index as f64 * scene.plan.seconds_per_pose,
+                joints: planned.joints.clone(),
+                temperatures_c: if injected.thermal.is_some() { temperatures_c } else { Vec::new() },
+                position_m: pose.translation.vector.into(),
+                attitude_xyzw: scene.sensor.attitude_sigma_rad.map(|_| [q.i, q.j, q.k, q.w]),
+            };
+            listener.take(&Event::Measured(measurement.clone()))?;
+            measurements.push(measurement);
+            poses.push(TruePose::new(index, &settled, rise));
+        }
+    }
+    Ok((measurements, Truth { parameters, poses }))
+}
+
+/// The sensor with the noise that it really has.
+struct SimulatedSensor<'a> {
+    declared: &'a Sensor,
+    noise: Noise,
+    position: Stream,
+    attitude: Stream,
+    temperature: Stream,
+}
+
+impl<'a> SimulatedSensor<'a> {
+    fn new(declared: &'a Sensor, injected: &Injected, public_seed: u64) -> Self {
+        let hidden = truth::hidden_seed(injected, public_seed);
+        SimulatedSensor {
+            declared,
+            noise: injected.noise,
+            position: stream(hidden, "noise/position"),
+            attitude: stream(hidden, "noise/attitude"),
+            temperature: stream(hidden, "noise/temperature"),
+        }
+    }
+
+    fn read(&mut self, truth: &Pose, exact: bool, rise_k: &[f64], reference_c: f64) -> (Pose, Vec<f64>) {
+        let mut normal = || Vector3::from_fn(|_, _| self.position.normal());
+        let position = match self.noise {
+            Noise::Declared { factor } => normal() * (factor * self.declared.position_sigma_at(&truth.translation.vector)),
+            Noise::Uniform { position_m, .. } => Vector3::from_fn(|_, _| self.position.uniform(-position_m, position_m)),
+            Noise::Off => Vector3::zeros(),
+        };
+        let attitude = match self.noise {
+            Noise::Declared { factor } => {
+                Vector3::from_fn(|_, _| self.attitude.normal()) * (factor * self.declared.attitude_sigma_rad.unwrap_or(0.0))
+            }
+            Noise::Uniform { attitude_rad, .. } => Vector3::from_fn(|_, _| self.attitude.uniform(-attitude_rad, attitude_rad)),
+            Noise::Off => Vector3::zeros(),
+        };
+        let sigma_k = self.declared.temperature_sigma_k;
+        let temperatures = rise_k.iter().map(|rise| reference_c + rise + sigma_k * self.temperature.normal()).collect();
+        if exact {
+            return (*truth, temperatures);
+        }
+        let mut read = *truth;
+        read.translation.vector += position;
+        read.rotation = rotation_from_vector(&attitude) * read.rotation;
+        (read, temperatures)
+    }
+}

@@ -1,0 +1,64 @@
+//! Why an arm cannot be simulated.
+
+use thiserror::Error;
+
+/// Why [`super::PhysicalArm::new`] refused.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum PhysicsError {
+    /// A moving link has no mass distribution.
+    #[error("link `{link}` has no inertial: physics needs the mass, centre of mass and inertia of every moving link")]
+    MissingInertial {
+        /// Its name.
+        link: String,
+    },
+    /// A mass, centre of mass or inertia that no body has.
+    #[error("the inertial of link `{link}` is not one of a body: {what}")]
+    BadInertial {
+        /// Its name.
+        link: String,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// Two lists that belong together differ in length.
+    #[error("{got} {what}, expected {expected}")]
+    Count {
+        /// What was counted.
+        what: &'static str,
+        /// How many there are.
+        got: usize,
+        /// How many there should be.
+        expected: usize,
+    },
+    /// A clearance that is negative, not finite, or so large that first-order play no longer describes it.
+    #[error("{what} clearance of joint {joint} is {got}, allowed is 0 to {largest} ({unit})")]
+    BadClearance {
+        /// Index of the joint.
+        joint: usize,
+        /// Radial, axial or tilt.
+        what: &'static str,
+        /// The value.
+        got: f64,
+        /// The largest that is allowed.
+        largest: f64,
+        /// Its unit.
+        unit: &'static str,
+    },
+    /// A number that is not finite.
+    #[error("{what} is {got}, expected a finite number")]
+    NotFinite {
+        /// Where it stands.
+        what: String,
+        /// The value.
+        got: f64,
+    },
+    /// A setting outside its range.
+    #[error("settling.{what} is {got}, expected {expected}")]
+    BadSetting {
+        /// Name of the setting.
+        what: &'static str,
+        /// The value.
+        got: f64,
+        /// What is allowed.
+        expected: &'static str,
+    },
+}

@@ -1,0 +1,87 @@
+//! How a pose is waited for, and what comes out.
+
+use super::clearance::Seat;
+use super::error::PhysicsError;
+use crate::frames::Pose;
+
+/// Where the joints lie in their clearances when the simulation starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// In the middle of every clearance.
+    Centre,
+    /// Where rigid statics predicts them to rest.
+    Predicted,
+}
+
+/// When a pose counts as settled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settling {
+    /// Where the joints start in their clearances.
+    pub start: Start,
+    /// Settled when a step moves the tool's origin by less than this, m,
+    pub tolerance_m: f64,
+    /// and turns it by less than this, rad.
+    pub tolerance_rad: f64,
+    /// After so many steps the pose is taken as it is.
+    pub steps_max: usize,
+    /// Duration of a step, s.
+    pub time_step_s: f64,
+    /// A radial or axial coordinate moves if its load is at least this fraction of the weight outboard of the joint, a tilt if
+    /// its moment is at least this fraction of that weight times the length of the segments outboard of the joint: the friction
+    /// of the fit.
+    pub holding_ratio: f64,
+}
+
+impl Default for Settling {
+    fn default() -> Self {
+        Settling {
+            start: Start::Predicted,
+            tolerance_m: 1e-9,
+            tolerance_rad: 1e-9,
+            steps_max: 50,
+            time_step_s: 1.0,
+            holding_ratio: 0.02,
+        }
+    }
+}
+
+impl Settling {
+    pub(super) fn check(&self) -> Result<(), PhysicsError> {
+        let positive = [
+            ("tolerance_m", self.tolerance_m),
+            ("tolerance_rad", self.tolerance_rad),
+            ("time_step_s", self.time_step_s),
+            ("holding_ratio", self.holding_ratio),
+        ];
+        for (what, got) in positive {
+            if !(got > 0.0 && got.is_finite()) {
+                return Err(PhysicsError::BadSetting { what, got, expected: "a positive number" });
+            }
+        }
+        if self.steps_max == 0 {
+            return Err(PhysicsError::BadSetting { what: "steps_max", got: 0.0, expected: "at least 1" });
+        }
+        Ok(())
+    }
+}
+
+/// A pose of the arm at rest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settled {
+    /// Pose of the tool.
+    pub base_from_tool: Pose,
+    /// Pose of every link, base first.
+    pub base_from_link: Vec<Pose>,
+    /// How far the tool's origin may still be from rest, m.
+    pub settling_error_m: f64,
+    /// The same for its attitude, rad.
+    pub settling_error_rad: f64,
+    /// Simulated steps; none if no joint has clearance.
+    pub steps: usize,
+    /// Simulated time, s.
+    pub simulated_time_s: f64,
+    /// Whether the tolerances of [`Settling`] were met.
+    pub converged: bool,
+    /// Where each joint lies in its clearance.
+    pub seats: Vec<Seat>,
+}

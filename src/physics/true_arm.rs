@@ -1,0 +1,163 @@
+//! The true arm in plain numbers: what both the multibody and the static seat are made of.
+
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
+
+use super::clearance::{Clearance, SeatedBy};
+use super::error::PhysicsError;
+use crate::arm::{Arm, Inertial};
+use crate::frames::Pose;
+use crate::kinematics::JointKind;
+
+/// Segments, masses and clearances of the arm with its true parameters.
+#[derive(Clone, Debug)]
+pub(super) struct TrueArm {
+    /// `link_from_joint` of each joint, and last `link_from_tool`; see [`crate::kinematics::ChainAt::segments`].
+    pub(super) segments: Vec<Pose>,
+    /// How each joint moves.
+    pub(super) kinds: Vec<JointKind>,
+    /// Play of each joint.
+    pub(super) clearances: Vec<Clearance>,
+    /// Mass distribution of the link that each joint moves, in the frame after the joint's motion.
+    pub(super) inertials: Vec<Inertial>,
+    /// m/s².
+    pub(super) gravity_in_base: Vector3<f64>,
+    /// Pose of the base link's frame in the chain's first frame.
+    pub(super) base_from_base_link: Pose,
+    /// Below these loads a joint's coordinates do not move.
+    pub(super) holding: Vec<Holding>,
+}
+
+/// Loads below which the friction of a fit keeps it where it is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Holding {
+    /// N, for the radial and the axial coordinate.
+    pub(super) force: f64,
+    /// N·m, for the tilt.
+    pub(super) moment: f64,
+}
+
+/// Rounding leaves about 1e-14 N on an axis without load; nothing real is this small.
+const SMALLEST_HOLDING: f64 = 1e-9;
+
+impl TrueArm {
+    pub(super) fn new(
+        arm: &Arm,
+        parameters_true: &[f64],
+        clearances: &[Clearance],
+        holding_ratio: f64,
+    ) -> Result<Self, PhysicsError> {
+        let count = arm.joint_count();
+        check_count("true parameters", parameters_true.len(), arm.chain.parameters.len())?;
+        check_count("clearances", clearances.len(), count)?;
+        check_count("links (one per joint, and the base)", arm.links.len(), count + 1)?;
+        for (parameter, value) in arm.chain.parameters.iter().zip(parameters_true) {
+            check_finite(|| format!("true parameter `{}`", parameter.name), *value)?;
+        }
+        for component in &arm.gravity_in_base {
+            check_finite(|| "gravity".to_owned(), *component)?;
+        }
+        for (joint, clearance) in clearances.iter().enumerate() {
+            clearance.check(joint)?;
+        }
+        let inertials = arm.links[1..].iter().map(checked_inertial).collect::<Result<Vec<_>, _>>()?;
+        let at = arm.chain.at(parameters_true);
+        let base = arm.chain.frame_names().iter().position(|name| *name == arm.links[0].name);
+        let base_from_base_link = base.map_or_else(Pose::identity, |index| at.frames(&vec![0.0; count])[index]);
+        let segments = at.segments();
+        let gravity = arm.gravity_in_base.norm();
+        let holding = (0..count)
+            .map(|joint| {
+                let weight = gravity * inertials[joint..].iter().map(|inertial| inertial.mass_kg).sum::<f64>();
+                let reach: f64 = segments[joint + 1..].iter().map(|segment| segment.translation.vector.norm()).sum();
+                Holding {
+                    force: (holding_ratio * weight).max(SMALLEST_HOLDING),
+                    moment: (holding_ratio * weight * reach).max(SMALLEST_HOLDING),
+                }
+            })
+            .collect();
+        Ok(TrueArm {
+            segments,
+            kinds: arm.chain.joints.iter().map(|joint| joint.kind).collect(),
+            clearances: clearances.to_vec(),
+            inertials,
+            gravity_in_base: arm.gravity_in_base,
+            base_from_base_link,
+            holding,
+        })
+    }
+
+    pub(super) fn joint_count(&self) -> usize {
+        self.kinds.len()
+    }
+
+    /// Segment `index` when the link it is on has grown by the factor `growth[index]`.
+    pub(super) fn grown_segment(&self, index: usize, growth: &[f64]) -> Pose {
+        let segment = &self.segments[index];
+        Pose::from_parts(Translation3::from(segment.translation.vector * growth[index]), segment.rotation)
+    }
+
+    /// The motions of joint `joint` at coordinate `q`: inboard of its play, and outboard of it.
+    pub(super) fn motions(&self, joint: usize, q: f64) -> (Pose, Pose) {
+        match self.kinds[joint] {
+            JointKind::Revolute => (Pose::identity(), turn_about_z(q)),
+            JointKind::Prismatic => (Pose::translation(0.0, 0.0, q), Pose::identity()),
+        }
+    }
+
+    /// What seats the radial, axial and tilt coordinate of `joint` under these loads (N, N, N·m).
+    pub(super) fn seated_by(&self, joint: usize, radial: f64, axial: f64, tilt: f64) -> [SeatedBy; 3] {
+        let (clearance, holding) = (&self.clearances[joint], &self.holding[joint]);
+        let by = |clearance: f64, load: f64, holding: f64| {
+            if clearance == 0.0 {
+                SeatedBy::Fit
+            } else if load.abs() >= holding {
+                SeatedBy::Load
+            } else {
+                SeatedBy::Friction
+            }
+        };
+        [
+            by(clearance.radial_m, radial, holding.force),
+            by(clearance.axial_m, axial, holding.force),
+            by(clearance.tilt_rad, tilt, holding.moment),
+        ]
+    }
+}
+
+/// The rotation by `angle` (rad) about z.
+pub(super) fn turn_about_z(angle: f64) -> Pose {
+    let (sine, cosine) = libm::sincos(angle / 2.0);
+    let rotation = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(cosine, 0.0, 0.0, sine));
+    Pose::from_parts(Translation3::identity(), rotation)
+}
+
+fn check_count(what: &'static str, got: usize, expected: usize) -> Result<(), PhysicsError> {
+    if got == expected { Ok(()) } else { Err(PhysicsError::Count { what, got, expected }) }
+}
+
+fn check_finite(what: impl FnOnce() -> String, got: f64) -> Result<(), PhysicsError> {
+    if got.is_finite() { Ok(()) } else { Err(PhysicsError::NotFinite { what: what(), got }) }
+}
+
+fn checked_inertial(link: &crate::arm::Link) -> Result<Inertial, PhysicsError> {
+    let inertial = link.inertial.clone().ok_or_else(|| PhysicsError::MissingInertial { link: link.name.clone() })?;
+    let bad = |what: &str| Err(PhysicsError::BadInertial { link: link.name.clone(), what: what.to_owned() });
+    if !(inertial.mass_kg >= 0.0 && inertial.mass_kg.is_finite()) {
+        return bad(&format!("its mass is {} kg", inertial.mass_kg));
+    }
+    if !inertial.centre_of_mass_in_link.coords.iter().all(|value| value.is_finite()) {
+        return bad("its centre of mass is not finite");
+    }
+    let inertia = &inertial.inertia_in_link;
+    if !inertia.iter().all(|value| value.is_finite()) {
+        return bad("its inertia is not finite");
+    }
+    if (inertia - inertia.transpose()).norm() > 1e-9 * inertia.norm() {
+        return bad("its inertia is not symmetric");
+    }
+    // Zero is allowed (a point mass); rounding may put it a little below.
+    if inertia.symmetric_eigenvalues().min() < -1e-12 * inertia.norm() {
+        return bad("its inertia is negative about some axis");
+    }
+    Ok(inertial)
+}
