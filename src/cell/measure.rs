@@ -145,7 +145,8 @@ impl<'a> SimulatedSensor<'a> {
             Noise::Off => Vector3::zeros(),
         };
         let sigma_k = self.declared.temperature_sigma_k;
-        let temperatures = rise_k.iter().map(|rise| reference_c + rise + sigma_k * self.temperature.normal()).collect();
+        // The base link has no sensor.
+        let temperatures = rise_k.iter().skip(1).map(|rise| reference_c + rise + sigma_k * self.temperature.normal()).collect();
         if exact {
             return (*truth, temperatures);
         }

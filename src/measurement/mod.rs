@@ -1,5 +1,7 @@
 //! What a real cell would know of a measured configuration. There is no truth in here.
 
+pub mod table;
+
 use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -27,7 +29,7 @@ pub struct Measurement {
     pub time_s: f64,
     /// Joint readings, rad (m for prismatic joints).
     pub joints: Vec<f64>,
-    /// Link temperatures as read, °C, base link first; empty where there are no sensors.
+    /// Temperatures of the moving links as read, °C, link 1 first; empty where there are no sensors.
     #[serde(default)]
     pub temperatures_c: Vec<f64>,
     /// Measured origin of the tool frame, m.

@@ -1,0 +1,335 @@
+//! Measurement tables (CSV): what a real cell writes down.
+//!
+//! A header names the columns and their units; `#` starts a comment line; columns stand in any order; an unknown column is an error.
+//! `pose_id`, `time_s`, `q1_rad`…`qN_rad` (or `_deg`; `_m`, `_mm` for prismatic joints), `x_m, y_m, z_m` (or `_mm`), optional
+//! `qx, qy, qz, qw`, `role` (`fit`, `held_out`), `temp_ambient_c`, `temp1_c`…, and the columns that only the diagnosis uses:
+//! `target`, `approach1`…, `payload_kg`, `dwell_s`, `session`.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use super::{Measurement, Role};
+
+/// A table that has been read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    /// Rows in the order of the file.
+    pub measurements: Vec<Measurement>,
+    /// Columns that were read but that an identification does not use.
+    pub unused_columns: Vec<String>,
+}
+
+/// A table that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum TableError {
+    /// The file cannot be read.
+    #[error("{file}: {source}")]
+    Unreadable {
+        /// Path.
+        file: String,
+        /// Cause.
+        source: std::io::Error,
+    },
+    /// Something in the header or a row is wrong.
+    #[error("{file}, line {line}: {message}")]
+    Wrong {
+        /// Path.
+        file: String,
+        /// Line, from 1.
+        line: u64,
+        /// What was found, what is allowed.
+        message: String,
+    },
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Column {
+    PoseId,
+    Time,
+    Joint { joint: usize, factor: f64 },
+    Position { axis: usize, factor: f64 },
+    Quaternion { component: usize },
+    Role,
+    Temperature { sensor: usize },
+    Unused,
+}
+
+const ALLOWED: &str = "pose_id, time_s, q1_rad… (or _deg, _m, _mm), x_m, y_m, z_m (or _mm), qx, qy, qz, qw, role, target, \
+                       approach1…, temp_ambient_c, temp1_c…, payload_kg, dwell_s, session";
+
+/// Reads the table at `path`.
+///
+/// # Errors
+/// If it cannot be read, or names the line and what is wrong with it.
+pub fn read(path: &Path) -> Result<Table, TableError> {
+    let file = path.display().to_string();
+    let text = std::fs::read_to_string(path).map_err(|source| TableError::Unreadable { file: file.clone(), source })?;
+    parse(&text, &file)
+}
+
+/// Reads a table from `text`; `file` is its name in messages.
+///
+/// # Errors
+/// Names the line and what is wrong with it.
+pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
+    let wrong = |line, message| TableError::Wrong { file: file.to_owned(), line, message };
+    let mut reader =
+        csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).flexible(true).from_reader(text.as_bytes());
+    let header = reader.headers().map_err(|error| wrong(1, error.to_string()))?.clone();
+    let header_line = header.position().map_or(1, csv::Position::line);
+    let columns = header
+        .iter()
+        .map(|name| column(name).map_err(|message| wrong(header_line, message)))
+        .collect::<Result<Vec<_>, _>>()?;
+    let layout = Layout::new(&columns, &header).map_err(|message| wrong(header_line, message))?;
+
+    let mut measurements: Vec<Measurement> = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|error| wrong(error.position().map_or(0, csv::Position::line), error.to_string()))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        if record.len() != columns.len() {
+            let message = format!("{} values, but the header names {} columns", record.len(), columns.len());
+            return Err(wrong(line, message));
+        }
+        let index = measurements.len();
+        let mut row = Measurement {
+            index,
+            pose_id: index,
+            role: Role::Fit,
+            time_s: index as f64,
+            joints: vec![0.0; layout.joints],
+            temperatures_c: vec![0.0; layout.sensors],
+            position_m: [0.0; 3],
+            attitude_xyzw: layout.attitude.then_some([0.0; 4]),
+        };
+        for ((column, text), name) in columns.iter().zip(record.iter()).zip(header.iter()) {
+            let number = || match text.parse::<f64>() {
+                Ok(value) if value.is_finite() => Ok(value),
+                _ => Err(wrong(line, format!("`{name}` is `{text}`; a finite number is needed"))),
+            };
+            match column {
+                Column::PoseId => {
+                    row.pose_id = text
+                        .parse()
+                        .map_err(|_| wrong(line, format!("`pose_id` is `{text}`; a whole number from 0 is needed")))?;
+                }
+                Column::Time => row.time_s = number()?,
+                Column::Joint { joint, factor } => row.joints[*joint] = number()? * factor,
+                Column::Position { axis, factor } => row.position_m[*axis] = number()? * factor,
+                Column::Quaternion { component } => {
+                    let value = number()?;
+                    if let Some(quaternion) = &mut row.attitude_xyzw {
+                        quaternion[*component] = value;
+                    }
+                }
+                Column::Role => {
+                    row.role = match text {
+                        "fit" => Role::Fit,
+                        "held_out" => Role::HeldOut,
+                        _ => return Err(wrong(line, format!("`role` is `{text}`; `fit` or `held_out` is needed"))),
+                    }
+                }
+                Column::Temperature { sensor } => row.temperatures_c[*sensor] = number()?,
+                Column::Unused => {}
+            }
+        }
+        if let Some(quaternion) = &mut row.attitude_xyzw {
+            let norm = quaternion.iter().map(|component| component * component).sum::<f64>().sqrt();
+            if (norm - 1.0).abs() > 1e-3 {
+                return Err(wrong(line, format!("the quaternion (qx, qy, qz, qw) has length {norm:.6}; it must be 1")));
+            }
+            // Files carry few digits; readings already exact keep their bits.
+            if (norm - 1.0).abs() > 1e-15 {
+                quaternion.iter_mut().for_each(|component| *component /= norm);
+            }
+        }
+        measurements.push(row);
+    }
+    if measurements.is_empty() {
+        return Err(wrong(header_line, "the table has a header but no rows".to_owned()));
+    }
+    let unused_columns =
+        header.iter().zip(&columns).filter(|(_, column)| **column == Column::Unused).map(|(name, _)| name.to_owned()).collect();
+    Ok(Table { measurements, unused_columns })
+}
+
+/// Writes `measurements` in the format that [`parse`] reads, bit for bit.
+#[must_use]
+pub fn write(measurements: &[Measurement]) -> String {
+    let joints = measurements.first().map_or(0, |row| row.joints.len());
+    let sensors = measurements.iter().map(|row| row.temperatures_c.len()).min().unwrap_or(0);
+    let attitude = measurements.iter().all(|row| row.attitude_xyzw.is_some());
+    let mut text = String::from("pose_id,role,time_s");
+    let columns = (1..=joints).map(|joint| format!("q{joint}_rad")).chain(["x_m", "y_m", "z_m"].map(str::to_owned));
+    let quaternion = attitude.then_some(["qx", "qy", "qz", "qw"]).into_iter().flatten().map(str::to_owned);
+    for name in columns.chain(quaternion).chain((1..=sensors).map(|sensor| format!("temp{sensor}_c"))) {
+        text.push(',');
+        text.push_str(&name);
+    }
+    text.push('\n');
+    for row in measurements {
+        let role = if row.role == Role::Fit { "fit" } else { "held_out" };
+        let _ = write!(text, "{},{role},{}", row.pose_id, row.time_s);
+        let quaternion = row.attitude_xyzw.iter().filter(|_| attitude).flatten();
+        for value in row.joints.iter().chain(&row.position_m).chain(quaternion).chain(&row.temperatures_c[..sensors]) {
+            let _ = write!(text, ",{value}");
+        }
+        text.push('\n');
+    }
+    text
+}
+
+struct Layout {
+    joints: usize,
+    sensors: usize,
+    attitude: bool,
+}
+
+impl Layout {
+    fn new(columns: &[Column], header: &csv::StringRecord) -> Result<Layout, String> {
+        for (index, name) in header.iter().enumerate() {
+            if header.iter().take(index).any(|other| other == name) {
+                return Err(format!("column `{name}` stands there twice"));
+            }
+        }
+        let joints = numbered(columns, |column| match column {
+            Column::Joint { joint, .. } => Some(*joint),
+            _ => None,
+        })
+        .map_err(|missing| format!("joint columns must be q1, q2, … without a gap, each once: q{} is missing or doubled", missing + 1))?;
+        if joints == 0 {
+            return Err("no joint columns; q1_rad, q2_rad, … (or _deg, _m, _mm) are needed".to_owned());
+        }
+        let axes = numbered(columns, |column| match column {
+            Column::Position { axis, .. } => Some(*axis),
+            _ => None,
+        });
+        if axes != Ok(3) {
+            return Err("the measured position needs x_m, y_m and z_m (or _mm), each once".to_owned());
+        }
+        let components = numbered(columns, |column| match column {
+            Column::Quaternion { component } => Some(*component),
+            _ => None,
+        });
+        let attitude = match components {
+            Ok(0) => false,
+            Ok(4) => true,
+            _ => return Err("an attitude needs all of qx, qy, qz, qw".to_owned()),
+        };
+        let sensors = numbered(columns, |column| match column {
+            Column::Temperature { sensor } => Some(*sensor),
+            _ => None,
+        })
+        .map_err(|missing| format!("temperature columns must be temp1_c, temp2_c, … without a gap: temp{}_c is missing", missing + 1))?;
+        Ok(Layout { joints, sensors, attitude })
+    }
+}
+
+/// How many of 0, 1, 2, … occur, each once; the first that does not otherwise.
+fn numbered(columns: &[Column], number: impl Fn(&Column) -> Option<usize>) -> Result<usize, usize> {
+    let mut numbers: Vec<usize> = columns.iter().filter_map(number).collect();
+    numbers.sort_unstable();
+    match numbers.iter().enumerate().find(|(index, number)| index != *number) {
+        Some((missing, _)) => Err(missing),
+        None => Ok(numbers.len()),
+    }
+}
+
+fn column(name: &str) -> Result<Column, String> {
+    const DEGREE: f64 = std::f64::consts::PI / 180.0;
+    let fixed = match name {
+        "pose_id" => Some(Column::PoseId),
+        "time_s" => Some(Column::Time),
+        "role" => Some(Column::Role),
+        "target" | "temp_ambient_c" | "payload_kg" | "dwell_s" | "session" => Some(Column::Unused),
+        _ => None,
+    };
+    if let Some(column) = fixed {
+        return Ok(column);
+    }
+    if let Some(component) = ["qx", "qy", "qz", "qw"].iter().position(|known| *known == name) {
+        return Ok(Column::Quaternion { component });
+    }
+    let unknown = || Err(format!("unknown column `{name}`; known are {ALLOWED}"));
+    if let Some(axis) = ["x", "y", "z"].iter().position(|axis| name == *axis || name.starts_with(&format!("{axis}_"))) {
+        return match &name[1..] {
+            "_m" => Ok(Column::Position { axis, factor: 1.0 }),
+            "_mm" => Ok(Column::Position { axis, factor: 1e-3 }),
+            _ => Err(format!("column `{name}` has no known unit; write {0}_m or {0}_mm", &name[..1])),
+        };
+    }
+    if let Some(rest) = name.strip_prefix("approach") {
+        return if rest.parse::<usize>().is_ok_and(|joint| joint > 0) { Ok(Column::Unused) } else { unknown() };
+    }
+    if let Some(rest) = name.strip_prefix("temp") {
+        return match rest.strip_suffix("_c").and_then(|number| number.parse().ok()) {
+            Some(sensor @ 1..=1000) => Ok(Column::Temperature { sensor: sensor - 1 }),
+            _ => unknown(),
+        };
+    }
+    let Some(rest) = name.strip_prefix('q') else {
+        return unknown();
+    };
+    let digits = rest.chars().take_while(char::is_ascii_digit).count();
+    let Some(joint) = rest[..digits].parse::<usize>().ok().filter(|joint| (1..=1000).contains(joint)) else {
+        return unknown();
+    };
+    let factor = match &rest[digits..] {
+        "_rad" | "_m" => 1.0,
+        "_deg" => DEGREE,
+        "_mm" => 1e-3,
+        _ => return Err(format!("column `{name}` has no known unit; write q{joint}_rad, _deg, _m or _mm")),
+    };
+    Ok(Column::Joint { joint: joint - 1, factor })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_in_any_order_with_units_and_comments() {
+        let text = "# by hand\nz_mm,q2_deg,x_mm,y_mm,q1_rad,pose_id,temp_ambient_c\n# note\n3000,180,1000,2000,0.5,7,21\n";
+        let table = parse(text, "t.csv").unwrap();
+        let row = &table.measurements[0];
+        assert_eq!((row.pose_id, row.position_m), (7, [1.0, 2.0, 3.0]));
+        assert_eq!(row.joints, [0.5, std::f64::consts::PI]);
+        assert_eq!(table.unused_columns, ["temp_ambient_c"]);
+    }
+
+    #[test]
+    fn what_is_written_is_read_back_bit_for_bit() {
+        let row = |index: usize| Measurement {
+            index,
+            pose_id: index / 2,
+            role: if index == 1 { Role::HeldOut } else { Role::Fit },
+            time_s: 0.1 * index as f64,
+            joints: vec![0.1 + 0.2, -1e-17, 3.0],
+            temperatures_c: vec![20.1, 1.0 / 3.0],
+            position_m: [1.0 / 3.0, -2.0 / 7.0, 1e-9],
+            attitude_xyzw: Some([0.5, -0.5, 0.5, -0.5]),
+        };
+        let rows = vec![row(0), row(1), row(2)];
+        assert_eq!(parse(&write(&rows), "t.csv").unwrap().measurements, rows);
+    }
+
+    #[test]
+    fn bad_tables_are_refused_with_line_and_remedy() {
+        for (text, expected) in [
+            ("q1_rad,x_m,y_m,z_m\n", "line 1: the table has a header but no rows"),
+            ("q1,x_m,y_m,z_m\n0,0,0,0\n", "column `q1` has no known unit; write q1_rad, _deg, _m or _mm"),
+            ("q1_rad,x_m,y_m,z_in\n0,0,0,0\n", "column `z_in` has no known unit; write z_m or z_mm"),
+            ("q1_rad,x_m,y_m\n0,0,0\n", "needs x_m, y_m and z_m"),
+            ("q1_rad,q3_rad,x_m,y_m,z_m\n", "q2 is missing or doubled"),
+            ("q1_rad,x_m,y_m,z_m,colour\n", "unknown column `colour`; known are pose_id"),
+            ("q1_rad,x_m,y_m,z_m,qx\n", "an attitude needs all of qx, qy, qz, qw"),
+            ("q1_rad,x_m,y_m,z_m\n0,0,0,0\n0,0,NaN,0\n", "line 3: `y_m` is `NaN`; a finite number is needed"),
+            ("q1_rad,x_m,y_m,z_m\n0,0,0\n", "line 2: 3 values, but the header names 4 columns"),
+            ("q1_rad,x_m,y_m,z_m,qx,qy,qz,qw\n0,0,0,0,0,0,0,2\n", "line 2: the quaternion (qx, qy, qz, qw) has length 2"),
+            ("q1_rad,x_m,x_m,y_m,z_m\n", "column `x_m` stands there twice"),
+        ] {
+            let message = parse(text, "t.csv").unwrap_err().to_string();
+            assert!(message.contains(expected) && message.starts_with("t.csv, line"), "{message}");
+        }
+    }
+}
