@@ -15,3 +15,4 @@ pub mod recording;
 pub mod scene;
 pub mod seed;
 pub mod self_collision;
+pub mod session;

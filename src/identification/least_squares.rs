@@ -98,7 +98,7 @@ pub fn identify(
         return Err(IdentificationError::TooFew { poses: fit.len(), equations, rank: structural, needed });
     }
 
-    let solution = solve(&problem, &subspace, nominal.clone(), start);
+    let solution = solve(&problem, &subspace.independent, nominal.clone(), start);
     let mut notes = Vec::new();
     let freedom = equations - rank;
     let noise = problem.noise_scale(&solution.values);
@@ -186,6 +186,19 @@ pub fn identify(
         residuals,
         notes,
     })
+}
+
+/// The nominal values of `arm` with the parameters `free` (columns) fitted to `measurements` and all others held; `None` if that
+/// does not converge. For frames that nobody has measured, such as the measurement frame and the target on the flange.
+pub(super) fn fit_some(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], free: &[usize]) -> Option<Vec<f64>> {
+    let problem = Problem::new(arm, sensor, Weights::Noise, measurements).ok()?;
+    let nominal = arm.chain.nominal();
+    let start = problem.linearise(&nominal);
+    let order: Vec<usize> = (0..free.len()).collect();
+    let seen = Subspace::reveal(&start.jacobian.select_columns(free), &order);
+    let columns: Vec<usize> = seen.independent.iter().map(|position| free[*position]).collect();
+    let solution = solve(&problem, &columns, nominal, start);
+    solution.converged.then_some(solution.values)
 }
 
 /// Errors of the model `chain` on `measurements`.
@@ -398,7 +411,7 @@ struct Solution {
     steps: usize,
 }
 
-fn solve(problem: &Problem<'_>, subspace: &Subspace, start: Vec<f64>, linearised: Linearised) -> Solution {
+fn solve(problem: &Problem<'_>, columns: &[usize], start: Vec<f64>, linearised: Linearised) -> Solution {
     let mut values = start;
     let mut here = linearised;
     let mut cost = here.residuals.norm_squared();
@@ -411,13 +424,13 @@ fn solve(problem: &Problem<'_>, subspace: &Subspace, start: Vec<f64>, linearised
         steps,
     };
     for step_number in 1..=MAX_STEPS {
-        let jacobian = here.jacobian.select_columns(&subspace.independent);
+        let jacobian = here.jacobian.select_columns(columns);
         let Some(step) = step(&jacobian, &here.residuals, damping) else {
             return done(values, here, false, "the equations became singular".to_owned(), step_number);
         };
         let change = (&jacobian * &step).norm();
         let mut trial = values.clone();
-        for (position, &column) in subspace.independent.iter().enumerate() {
+        for (position, &column) in columns.iter().enumerate() {
             trial[column] += step[position];
         }
         let there = problem.linearise(&trial);

@@ -1,5 +1,6 @@
 //! From measurements to parameters, with what can be known about them.
 
+pub mod alignment;
 pub mod least_squares;
 pub mod outcome;
 

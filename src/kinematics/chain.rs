@@ -129,6 +129,26 @@ impl Chain {
         self.rotate(Axis::X, format!("{prefix}_roll"), rpy[0]);
     }
 
+    /// The chain seen from a measurement frame: six parameters `base_x` … `base_roll` before everything else, and six parameters
+    /// `target_x` … of the target on the tool after everything else, all zero. Frames of these names must not be there yet.
+    #[must_use]
+    pub fn in_measurement_frame(&self) -> Chain {
+        let mut chain = Chain::new();
+        chain.frame("measurement");
+        chain.six_parameters("base", [0.0; 3], [0.0; 3]);
+        let shift = chain.parameters.len();
+        chain.steps.extend(self.steps.iter().cloned().map(|step| match step {
+            Step::Rotate { axis, parameter } => Step::Rotate { axis, parameter: parameter + shift },
+            Step::Translate { axis, parameter } => Step::Translate { axis, parameter: parameter + shift },
+            other => other,
+        }));
+        chain.parameters.extend(self.parameters.iter().cloned());
+        chain.joints.clone_from(&self.joints);
+        chain.six_parameters("target", [0.0; 3], [0.0; 3]);
+        chain.frame("target");
+        chain
+    }
+
     /// Nominal values in column order.
     #[must_use]
     pub fn nominal(&self) -> Vec<f64> {

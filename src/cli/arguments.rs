@@ -1,0 +1,180 @@
+//! Arguments of every command.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Calibration of robot arms with a physics simulator in the loop.
+#[derive(Debug, Parser)]
+#[command(
+    name = "kincal",
+    version,
+    about = "Calibrate robot arms: choose configurations, measure them (in a physics simulator or for real), identify the \
+             geometry, and keep a recording that replays bit for bit.",
+    after_help = "Examples:\n  \
+        kincal run scenes/arm8.toml                        the whole chain, to recordings/arm8.mcap\n  \
+        kincal run scenes/arm8.toml --json > result.json   the same for a program\n  \
+        kincal replay recordings/arm8.mcap                 recompute it and compare bit for bit\n  \
+        kincal identify cell.csv --robot ur5.urdf          calibrate a real arm from a table\n\n\
+        Exit codes: 0 done; 1 done, but the answer is bad (no convergence, a replay that differs); 2 the input is wrong."
+)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    pub(crate) global: Global,
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// Options of every command.
+#[derive(Debug, Args)]
+pub(crate) struct Global {
+    /// Print one JSON object on stdout; everything else goes to stderr
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+    /// Seed in place of the scene's
+    #[arg(long, global = true, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// Number of threads (the result does not depend on it)
+    #[arg(long, global = true, value_name = "N")]
+    pub(crate) threads: Option<NonZeroUsize>,
+    /// No progress bars, no notes
+    #[arg(long, short, global = true)]
+    pub(crate) quiet: bool,
+    /// Folder for what is written
+    #[arg(long, global = true, value_name = "DIR", default_value = "recordings")]
+    pub(crate) out: PathBuf,
+    /// Where to show the run: `auto` (a viewer that listens), `spawn`, `connect[=URL]`, `FILE.rrd`, `off`
+    #[arg(long, global = true, value_name = "TARGET", default_value = "auto")]
+    pub(crate) rerun: String,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// The whole chain: design, measurement, identification
+    #[command(after_help = "Example:\n  kincal run scenes/arm8.toml --set design.count=20 --seed 7 --rerun run.rrd")]
+    Run(SceneOptions),
+    /// Choose the configurations to measure
+    #[command(after_help = "Example:\n  kincal design scenes/arm8.toml --set design.method=\\\"random\\\"")]
+    Design(SceneOptions),
+    /// Measure configurations on the simulated arm
+    #[command(after_help = "Example:\n  kincal measure scenes/arm8.toml --design recordings/arm8-design.mcap")]
+    Measure(MeasureOptions),
+    /// Identify the geometry from a recording or a table of measurements
+    #[command(after_help = "Examples:\n  kincal identify recordings/arm8-measure.mcap\n  \
+        kincal identify grid.csv --robot ur5.urdf --evaluate random.csv --position-noise-um 25\n\n\
+        A table's header names columns and units: q1_rad… (or _deg), x_m, y_m, z_m (or _mm), optional qx, qy, qz, qw,\n\
+        pose_id, time_s, role (fit, held_out), temp1_c…. The measurement frame and the target on the flange are fitted.")]
+    Identify(IdentifyOptions),
+    /// Recompute a recording and compare bit for bit
+    #[command(after_help = "Examples:\n  kincal replay recordings/arm8.mcap\n  \
+        kincal replay recordings/arm8.mcap --truth recordings/arm8.truth.toml\n  \
+        kincal replay recordings/arm8.mcap --rerun spawn")]
+    Replay(ReplayOptions),
+    /// Write a robot or measurements in another format
+    #[command(after_help = "Examples:\n  kincal export scenes/arm8.toml --to urdf\n  \
+        kincal export recordings/arm8.mcap --to urdf        the calibrated arm\n  \
+        kincal export recordings/arm8.mcap --to csv         the measurements")]
+    Export(ExportOptions),
+    /// Repeat an experiment of Chen et al. 2019 beside its published numbers
+    #[command(after_help = "Example:\n  kincal reproduce count-error --arm scenes/paper.toml --trials 20")]
+    Reproduce(ReproduceOptions),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct SceneOptions {
+    /// Scene file (TOML)
+    pub(crate) scene: PathBuf,
+    /// Override a value of the scene, such as `design.count=20`; may be given again
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct MeasureOptions {
+    #[command(flatten)]
+    pub(crate) scene: SceneOptions,
+    /// Recording that holds a design, from `kincal design`
+    #[arg(long, value_name = "FILE")]
+    pub(crate) design: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct IdentifyOptions {
+    /// Recording (.mcap) or table of measurements (.csv)
+    pub(crate) input: PathBuf,
+    /// Other measurements of the same arm that carry the held-out error
+    #[arg(long, value_name = "FILE")]
+    pub(crate) evaluate: Option<PathBuf>,
+    /// Nominal robot of a table: a URDF or a scene
+    #[arg(long, value_name = "FILE")]
+    pub(crate) robot: Option<PathBuf>,
+    /// Link of the URDF at which the arm begins
+    #[arg(long, value_name = "LINK")]
+    pub(crate) base_link: Option<String>,
+    /// Link of the URDF that carries the target
+    #[arg(long, value_name = "LINK")]
+    pub(crate) tip_link: Option<String>,
+    /// Declared position noise of a table's sensor, one sigma per axis
+    #[arg(long, value_name = "UM", default_value_t = 20.0)]
+    pub(crate) position_noise_um: f64,
+    /// Declared attitude noise of a table's sensor, one sigma per axis
+    #[arg(long, value_name = "DEG", default_value_t = 0.005)]
+    pub(crate) attitude_noise_deg: f64,
+    /// Print every identifiable combination
+    #[arg(long)]
+    pub(crate) parameters: bool,
+    /// Use a recording that was cut off, up to the cut
+    #[arg(long)]
+    pub(crate) partial: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ReplayOptions {
+    /// Recording (.mcap)
+    pub(crate) recording: PathBuf,
+    /// Its truth file: the physics is then recomputed as well
+    #[arg(long, value_name = "FILE")]
+    pub(crate) truth: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ExportOptions {
+    /// Scene (.toml), recording (.mcap) or URDF
+    pub(crate) input: PathBuf,
+    /// Format
+    #[arg(long, value_enum)]
+    pub(crate) to: Format,
+    /// Use a recording that was cut off, up to the cut
+    #[arg(long)]
+    pub(crate) partial: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Format {
+    /// The arm: nominal from a scene, identified from a recording that holds an identification
+    Urdf,
+    /// The measurements of a recording
+    Csv,
+    /// The public part of the scene
+    Toml,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ReproduceOptions {
+    /// Experiment
+    #[arg(value_enum)]
+    pub(crate) item: Item,
+    /// Scene in place of the substitute arm
+    #[arg(long, value_name = "SCENE", default_value = "scenes/paper.toml")]
+    pub(crate) arm: PathBuf,
+    /// Calibrations per cell of the table
+    #[arg(long, value_name = "N", default_value = "20")]
+    pub(crate) trials: NonZeroUsize,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Item {
+    /// Table 4: held-out error against the number of configurations
+    CountError,
+}

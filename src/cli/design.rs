@@ -1,0 +1,23 @@
+//! `kincal design`: choosing alone.
+
+use serde_json::json;
+
+use super::Outcome;
+use super::arguments::{Global, SceneOptions};
+use super::output::{self, Audience};
+use crate::{design, report, session};
+
+pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result<Outcome> {
+    let file = output::scene(global, options)?;
+    let stem = output::stem(global, &file, "-design");
+    let mut audience = Audience::open(global, &file.scene.arm, Some(&stem), &stem)?;
+    session::start("design", &file.public_toml()?, &mut audience)?;
+    let outcome = design::design(&file.scene, &mut audience)?;
+    let recording = audience.finish()?;
+    output::show(global, &report::design(&outcome, file.scene.arm.chain.parameters.len()))?;
+    if let Some(recording) = &recording {
+        output::show(global, &format!("Recording   {}", recording.display()))?;
+    }
+    output::show_json(global, &json!({ "design": outcome, "recording": recording }))?;
+    Ok(Outcome::Good)
+}

@@ -1,0 +1,62 @@
+//! `kincal measure`: measuring alone, of configurations that a design chose.
+
+use anyhow::{Context, ensure};
+use serde_json::json;
+
+use super::Outcome;
+use super::arguments::{Global, MeasureOptions};
+use super::output::{self, Audience};
+use crate::recording::event::Event;
+use crate::{recording, session};
+
+pub(crate) fn command(global: &Global, options: &MeasureOptions) -> anyhow::Result<Outcome> {
+    let file = output::scene(global, &options.scene)?;
+    let injected = output::injected(&file)?;
+    let scene = &file.scene;
+    let designed = recording::read::read(&options.design)?;
+    let outcome = designed
+        .events
+        .iter()
+        .find_map(|event| match event {
+            Event::Designed(outcome) => Some(outcome),
+            _ => None,
+        })
+        .with_context(|| format!("{} holds no design; make one with `kincal design`", options.design.display()))?;
+    for (index, joints) in outcome.configurations.iter().enumerate() {
+        ensure!(
+            joints.len() == scene.arm.joint_count() && scene.arm.within_limits(joints),
+            "configuration {} of {} does not fit the arm of {}: {} joints within the scene's limits are needed; was it designed \
+             for another scene?",
+            index + 1,
+            options.design.display(),
+            options.scene.scene.display(),
+            scene.arm.joint_count(),
+        );
+    }
+
+    let stem = output::stem(global, &file, "-measure");
+    let mut audience = Audience::open(global, &scene.arm, Some(&stem), &stem)?;
+    session::start("measure", &file.public_toml()?, &mut audience)?;
+    let (measurements, truth) = session::measure_design(scene, injected, &outcome.configurations, &mut audience)?;
+    let recording = audience.finish()?;
+    let truth_path = global.out.join(format!("{stem}.truth.toml"));
+    super::run::truth_file(&file, &truth)?.write(&truth_path)?;
+
+    let settled = truth.poses.iter().filter(|pose| pose.settled).count();
+    let worst = truth.poses.iter().map(|pose| pose.settling_error_m).fold(0.0, f64::max);
+    let steps: usize = truth.poses.iter().map(|pose| pose.settling_steps).sum();
+    output::show(
+        global,
+        &format!(
+            "{} poses measured, {settled} settled; largest settling error {:.3} µm, {:.1} steps per pose",
+            measurements.len(),
+            worst * 1e6,
+            steps as f64 / measurements.len().max(1) as f64
+        ),
+    )?;
+    if let Some(recording) = &recording {
+        output::show(global, &format!("Recording   {}\nTruth       {}", recording.display(), truth_path.display()))?;
+    }
+    output::show_json(global, &json!({ "poses": measurements.len(), "settled": settled, "recording": recording, "truth": truth_path }))?;
+    Ok(if settled == measurements.len() { Outcome::Good } else { Outcome::Bad })
+}

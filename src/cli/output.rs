@@ -1,0 +1,165 @@
+//! What commands share: scenes with overrides, the file names of a run, listeners, and where text goes.
+
+use std::io::{IsTerminal, Write};
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::arguments::{Global, SceneOptions};
+use crate::arm::Arm;
+use crate::recording::event::{Event, Listener, ListenerError};
+use crate::recording::write::Recorder;
+use crate::scene::{Injected, SceneFile};
+
+/// Reads a scene and applies the overrides of the command line.
+pub(crate) fn scene(global: &Global, options: &SceneOptions) -> anyhow::Result<SceneFile> {
+    let mut file = crate::scene::read(&options.scene)?;
+    for assignment in &options.set {
+        let Some((key, value)) = assignment.split_once('=') else {
+            bail!("--set {assignment}: KEY=VALUE is needed, such as design.count=20");
+        };
+        file.set(key.trim(), value.trim()).with_context(|| format!("--set {assignment}"))?;
+    }
+    if let Some(seed) = global.seed {
+        file.set_seed(seed).context("--seed")?;
+    }
+    Ok(file)
+}
+
+/// The hidden part that only a simulated measurement needs.
+pub(crate) fn injected(file: &SceneFile) -> anyhow::Result<&Injected> {
+    file.injected.as_ref().context(
+        "the scene has no [injected] section: there is nothing to simulate; add one, or measure a real arm and use `kincal identify`",
+    )
+}
+
+/// Stem of a run's files: the scene's name, with the seed where the command line changed it.
+pub(crate) fn stem(global: &Global, file: &SceneFile, suffix: &str) -> String {
+    let seed = global.seed.map(|seed| format!("-seed{seed}")).unwrap_or_default();
+    format!("{}{seed}{suffix}", file.scene.name)
+}
+
+/// A note for people: on stderr, and not at all if they want quiet.
+pub(crate) fn note(global: &Global, text: &str) {
+    if !global.quiet {
+        eprintln!("{text}");
+    }
+}
+
+/// A result for people: on stdout, unless that is for a machine.
+pub(crate) fn show(global: &Global, text: &str) -> anyhow::Result<()> {
+    if global.json { Ok(()) } else { print(text) }
+}
+
+/// The result for a machine.
+pub(crate) fn show_json(global: &Global, value: &serde_json::Value) -> anyhow::Result<()> {
+    if global.json { print(&serde_json::to_string_pretty(value)?) } else { Ok(()) }
+}
+
+/// Writes to stdout; a reader that went away (`| head`) is no error.
+pub(crate) fn print(text: &str) -> anyhow::Result<()> {
+    match writeln!(std::io::stdout().lock(), "{text}") {
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        other => Ok(other?),
+    }
+}
+
+/// Everyone who listens to a run: the recording, the viewer, the progress bar.
+pub(crate) struct Audience {
+    recorder: Option<Recorder>,
+    #[cfg(feature = "viewer")]
+    viewer: Option<crate::viewing::Viewer>,
+    progress: Progress,
+}
+
+impl Audience {
+    /// Opens the viewer, then the recording (if `stem` is given): what can fail without leaving anything comes first.
+    pub(crate) fn open(global: &Global, arm: &Arm, stem: Option<&str>, name: &str) -> anyhow::Result<Audience> {
+        #[cfg(feature = "viewer")]
+        let viewer = {
+            let viewer = crate::viewing::open(&global.rerun.parse()?, arm, name)?;
+            if let Some(viewer) = &viewer {
+                note(global, &viewer.describe());
+            }
+            viewer
+        };
+        #[cfg(not(feature = "viewer"))]
+        {
+            let _ = name;
+            if !["auto", "off"].contains(&global.rerun.as_str()) {
+                bail!("--rerun {}: this kincal was built without the viewer; build it with the default features", global.rerun);
+            }
+        }
+        let recorder = stem.map(|stem| Recorder::create(&global.out, stem, arm)).transpose()?;
+        let visible = !global.quiet && std::io::stderr().is_terminal();
+        Ok(Audience {
+            recorder,
+            #[cfg(feature = "viewer")]
+            viewer,
+            progress: Progress::new(visible),
+        })
+    }
+
+    /// Ends the progress bar, the viewer and the recording; the path of the recording.
+    pub(crate) fn finish(self) -> anyhow::Result<Option<PathBuf>> {
+        self.progress.bar.finish_and_clear();
+        #[cfg(feature = "viewer")]
+        if let Some(viewer) = self.viewer {
+            viewer.finish()?;
+        }
+        Ok(self.recorder.map(Recorder::finish).transpose()?)
+    }
+}
+
+impl Listener for Audience {
+    fn take(&mut self, event: &Event) -> Result<(), ListenerError> {
+        self.progress.see(event);
+        if let Some(recorder) = &mut self.recorder {
+            recorder.take(event)?;
+        }
+        #[cfg(feature = "viewer")]
+        if let Some(viewer) = &mut self.viewer {
+            viewer.take(event)?;
+        }
+        Ok(())
+    }
+}
+
+struct Progress {
+    bar: ProgressBar,
+}
+
+impl Progress {
+    fn new(visible: bool) -> Self {
+        let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        Progress { bar: ProgressBar::with_draw_target(None, target) }
+    }
+
+    fn see(&self, event: &Event) {
+        match event {
+            Event::Swarm(iteration) => {
+                if iteration.iteration == 0 {
+                    self.start("choosing", iteration.iterations as u64);
+                }
+                self.bar.set_position(iteration.iteration as u64);
+                self.bar.set_message(format!("O_C {:.4}", iteration.best.comprehensive));
+            }
+            Event::Designed(outcome) => {
+                self.start("measuring", outcome.configurations.len() as u64);
+            }
+            Event::Measured(measurement) => self.bar.set_position(measurement.index as u64 + 1),
+            Event::Start(_) | Event::Identified(_) | Event::Note(_) => {}
+        }
+    }
+
+    fn start(&self, what: &'static str, length: u64) {
+        if let Ok(style) = ProgressStyle::with_template("{prefix:>10} {bar:40} {pos}/{len} {msg} {eta}") {
+            self.bar.set_style(style);
+        }
+        self.bar.set_prefix(what);
+        self.bar.set_message("");
+        self.bar.set_length(length);
+        self.bar.set_position(0);
+    }
+}

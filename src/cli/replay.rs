@@ -1,0 +1,95 @@
+//! `kincal replay`: recompute a recording and compare bit for bit.
+
+use anyhow::{Context, ensure};
+use serde_json::json;
+
+use super::Outcome;
+use super::arguments::{Global, ReplayOptions};
+use super::output::{self, Audience};
+use crate::recording::compare::Comparer;
+use crate::recording::event::{Event, Listener, ListenerError};
+use crate::recording::truth_file::TruthFile;
+use crate::{recording, scene, session};
+
+pub(crate) fn command(global: &Global, options: &ReplayOptions) -> anyhow::Result<Outcome> {
+    let path = &options.recording;
+    let recorded = recording::read::read(path)?;
+    let file = scene::parse(&recorded.start.scene, &format!("{} (scene)", path.display()))?;
+    let scene = &file.scene;
+
+    let truth = options.truth.as_ref().map(|truth| -> anyhow::Result<_> {
+        let truth_file = TruthFile::read(truth)?;
+        ensure!(
+            truth_file.scene == scene.name && truth_file.seed == scene.seed,
+            "{} belongs to scene `{}` with seed {}, the recording to `{}` with seed {}: give the truth file of this run",
+            truth.display(),
+            truth_file.scene,
+            truth_file.seed,
+            scene.name,
+            scene.seed
+        );
+        let text = toml::to_string(&truth_file.injected)?;
+        let injected = scene::parse_injected(&text, &truth.display().to_string(), &scene.arm)?;
+        Ok((injected, truth_file.truth()))
+    });
+    let truth = truth.transpose()?;
+
+    let mut replayer = Replayer {
+        comparer: Comparer::open(path, &scene.arm)?,
+        audience: Audience::open(global, &scene.arm, None, &format!("replay of {}", scene.name))?,
+    };
+    let recomputed = session::replay(scene, &recorded.events, truth.as_ref().map(|(injected, _)| injected), &mut replayer);
+    let cut = recorded.cut.is_some();
+    let new_truth = match recomputed {
+        Ok(truth) => truth,
+        // A cut recording may end where too little was measured.
+        Err(_) if cut => None,
+        Err(error) => return Err(error).with_context(|| format!("replaying {}", path.display())),
+    };
+    replayer.audience.finish()?;
+    let comparison = replayer.comparer.finish()?;
+    let truth_equal = match (&truth, &new_truth) {
+        (Some((_, recorded)), Some(new)) if !cut => recorded == new,
+        _ => true,
+    };
+
+    let physics = match (&truth, recorded.events.iter().any(|event| matches!(event, Event::Measured(_)))) {
+        (_, false) => "nothing was measured in it",
+        (Some(_), true) => "physics recomputed from the truth file",
+        (None, true) => "measurements taken as recorded (give --truth to recompute the physics)",
+    };
+    let identical = comparison.identical() && truth_equal;
+    let text = match &comparison.first_difference {
+        None if truth_equal => format!("identical: {} messages compared bit for bit; {physics}", comparison.compared),
+        None => "the recording is identical, but the truth file's parameters or poses differ from the physics".to_owned(),
+        Some(difference) => format!("different: {difference}"),
+    };
+    output::show(global, &text)?;
+    output::show_json(
+        global,
+        &json!({
+            "identical": identical && !cut,
+            "complete": !cut,
+            "messages_compared": comparison.compared,
+            "first_difference": comparison.first_difference.as_ref().map(ToString::to_string),
+            "truth_identical": truth.is_some().then_some(truth_equal),
+        }),
+    )?;
+    if let Some(cut) = &recorded.cut {
+        eprintln!("kincal: {}: {cut}", path.display());
+        anyhow::bail!("{} is cut off: what is there was compared, the rest is lost; run the scene again for a whole recording", path.display());
+    }
+    Ok(if identical { Outcome::Good } else { Outcome::Bad })
+}
+
+struct Replayer {
+    comparer: Comparer,
+    audience: Audience,
+}
+
+impl Listener for Replayer {
+    fn take(&mut self, event: &Event) -> Result<(), ListenerError> {
+        self.comparer.take(event)?;
+        self.audience.take(event)
+    }
+}

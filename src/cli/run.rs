@@ -1,0 +1,75 @@
+//! `kincal run`: the whole chain.
+
+use serde_json::json;
+
+use super::Outcome;
+use super::arguments::{Global, SceneOptions};
+use super::output::{self, Audience};
+use crate::kinematics::urdf;
+use crate::recording::truth_file::{TruthFile, write_whole};
+use crate::report;
+use crate::session;
+
+pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result<Outcome> {
+    let file = output::scene(global, options)?;
+    let injected = output::injected(&file)?;
+    let scene = &file.scene;
+    let stem = output::stem(global, &file, "");
+    let urdf_text = urdf::export(&scene.arm)?;
+
+    let mut audience = Audience::open(global, &scene.arm, Some(&stem), &stem)?;
+    let run = session::run(scene, &file.public_toml()?, injected, &mut audience)?;
+    let recording = audience.finish()?;
+
+    let truth_path = global.out.join(format!("{stem}.truth.toml"));
+    truth_file(&file, &run.truth)?.write(&truth_path)?;
+    let urdf_path = global.out.join(format!("{stem}.urdf"));
+    write_whole(&urdf_path, urdf_text.as_bytes())?;
+    let calibrated: Vec<f64> = run.identification.parameters.iter().map(|parameter| parameter.identified).collect();
+    let calibrated_path = global.out.join(format!("{stem}.calibrated.urdf"));
+    write_whole(&calibrated_path, urdf::export_with(&scene.arm, &calibrated)?.as_bytes())?;
+
+    let parameter_count = scene.arm.chain.parameters.len();
+    output::show(global, &format!("{}: {}\n{}\n", scene.name, scene.description, scene.arm_note))?;
+    output::show(global, &report::design(&run.design, parameter_count))?;
+    output::show(global, &report::identification(&run.identification))?;
+    if let Some(recording) = &recording {
+        output::show(
+            global,
+            &format!(
+                "Recording   {}\nTruth       {}\nNominal     {}\nCalibrated  {}",
+                recording.display(),
+                truth_path.display(),
+                urdf_path.display(),
+                calibrated_path.display()
+            ),
+        )?;
+    }
+    output::show_json(
+        global,
+        &json!({
+            "scene": scene.name,
+            "seed": scene.seed,
+            "design": run.design,
+            "identification": run.identification,
+            "recording": recording,
+            "truth": truth_path,
+            "urdf": urdf_path,
+            "calibrated_urdf": calibrated_path,
+        }),
+    )?;
+    Ok(if run.identification.converged { Outcome::Good } else { Outcome::Bad })
+}
+
+/// The truth file of a run of `file`.
+pub(crate) fn truth_file(file: &crate::scene::SceneFile, truth: &crate::cell::Truth) -> anyhow::Result<TruthFile> {
+    let injected = file.injected_toml()?.unwrap_or_default();
+    Ok(TruthFile {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        scene: file.scene.name.clone(),
+        seed: file.scene.seed,
+        injected: toml::from_str(&injected)?,
+        parameters: truth.parameters.clone(),
+        poses: truth.poses.clone(),
+    })
+}

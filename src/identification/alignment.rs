@@ -1,0 +1,86 @@
+//! Where a real arm stands in the measurement frame, and where the target sits on its tool: unknown, and fitted before all else.
+
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+use super::least_squares::fit_some;
+use crate::arm::Arm;
+use crate::measurement::{Measurement, Sensor};
+
+/// The measurement frame and the target could not be found.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum AlignmentError {
+    /// Too few rows.
+    #[error("{found} measurements cannot tell where the arm stands in the measurement frame; at least 4 different ones are needed")]
+    TooFew {
+        /// Rows.
+        found: usize,
+    },
+    /// All in one place.
+    #[error(
+        "the measured (or the nominal) positions lie in one point or on one line, so that they cannot tell where the arm stands; \
+         are the joint units right, and is it this robot?"
+    )]
+    Degenerate,
+    /// The fit failed.
+    #[error("fitting the measurement frame and the target did not converge; are the units right, and is it this robot?")]
+    NotConverged,
+}
+
+/// `arm` with its chain in the measurement frame ([`crate::kinematics::Chain::in_measurement_frame`]): the six parameters of the
+/// base and those of the target that can be seen have nominal values fitted to `measurements`, everything else stays nominal. This
+/// is the "nominal model" of a real arm, whose frames no data sheet tells.
+///
+/// # Errors
+/// If the measurements do not tell.
+pub fn align(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement]) -> Result<Arm, AlignmentError> {
+    if measurements.len() < 4 {
+        return Err(AlignmentError::TooFew { found: measurements.len() });
+    }
+    let nominal = arm.chain.at_nominal();
+    let poses: Vec<_> = measurements.iter().map(|measurement| nominal.forward(&measurement.joints)).collect();
+    let measured: Vec<Vector3<f64>> = measurements.iter().map(|measurement| measurement.position().coords).collect();
+    let predicted: Vec<Vector3<f64>> = poses.iter().map(|pose| pose.translation.vector).collect();
+    let (rotation, translation) = registration(&predicted, &measured).ok_or(AlignmentError::Degenerate)?;
+
+    let mut aligned = arm.clone();
+    aligned.chain = arm.chain.in_measurement_frame();
+    let parameters = &mut aligned.chain.parameters;
+    let count = parameters.len();
+    let mut set = |first: usize, translation: Vector3<f64>, rotation: UnitQuaternion<f64>| {
+        let (roll, pitch, yaw) = rotation.euler_angles();
+        let values = [translation.x, translation.y, translation.z, yaw, pitch, roll];
+        for (parameter, value) in parameters[first..first + 6].iter_mut().zip(values) {
+            parameter.nominal = value;
+        }
+    };
+    set(0, translation, rotation);
+    // Where attitudes are measured, the first tells the target's well enough to start from.
+    if let (Some(attitude), Some(pose)) = (measurements[0].attitude(), poses.first()) {
+        set(count - 6, Vector3::zeros(), (rotation * pose.rotation).inverse() * attitude);
+    }
+    let free: Vec<usize> = (0..6).chain(count - 6..count).collect();
+    let values = fit_some(&aligned, sensor, measurements, &free).ok_or(AlignmentError::NotConverged)?;
+    for (parameter, value) in aligned.chain.parameters.iter_mut().zip(values) {
+        parameter.nominal = value;
+    }
+    Ok(aligned)
+}
+
+/// The rotation and translation that bring `from` nearest to `to` (Kabsch 1976); `None` where the points lie on a line.
+fn registration(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<(UnitQuaternion<f64>, Vector3<f64>)> {
+    let count = from.len() as f64;
+    let (from_centre, to_centre) = (from.iter().sum::<Vector3<f64>>() / count, to.iter().sum::<Vector3<f64>>() / count);
+    let covariance: Matrix3<f64> = from.iter().zip(to).map(|(from, to)| (to - to_centre) * (from - from_centre).transpose()).sum();
+    let svd = covariance.svd(true, true);
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    let mut values: Vec<f64> = svd.singular_values.iter().copied().collect();
+    values.sort_by(|a, b| b.total_cmp(a));
+    if values[1] <= values[0] * 1e-9 || !values[0].is_finite() {
+        return None;
+    }
+    let smallest = svd.singular_values.imin();
+    let mut signs = Matrix3::identity();
+    signs[(smallest, smallest)] = (u * v_t).determinant().signum();
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(u * signs * v_t));
+    Some((rotation, to_centre - rotation * from_centre))
+}

@@ -1,0 +1,171 @@
+//! Results as tables for people. Units are in the headers; machines get the same results as JSON.
+
+use comfy_table::{Cell, CellAlignment, Table, presets};
+
+use crate::design::outcome::{DesignOutcome, StopReason};
+use crate::identification::outcome::{Errors, Identification, Summary};
+use crate::quality::Indexes;
+
+/// A table whose first column is text and whose others are numbers.
+fn table(header: &[&str], rows: Vec<Vec<String>>) -> String {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_header(header.iter().enumerate().map(|(column, name)| cell(column, name)));
+    for row in rows {
+        table.add_row(row.iter().enumerate().map(|(column, text)| cell(column, text)));
+    }
+    table.to_string()
+}
+
+fn cell(column: usize, text: &str) -> Cell {
+    let alignment = if column == 0 { CellAlignment::Left } else { CellAlignment::Right };
+    Cell::new(text).set_alignment(alignment)
+}
+
+/// Indexes of the chosen set beside random sets of the same size.
+#[must_use]
+pub fn design(outcome: &DesignOutcome, parameter_count: usize) -> String {
+    let atan = |value: f64| std::f64::consts::FRAC_2_PI * libm::atan(value);
+    let row = |name: &str, get: &dyn Fn(&Indexes) -> f64| {
+        let random = &outcome.random;
+        vec![
+            name.to_owned(),
+            number(get(&random.mean)),
+            format!("{} … {}", number(get(&random.min)), number(get(&random.max))),
+            number(get(&outcome.indexes)),
+            number(get(&outcome.indexes_all_parameters)),
+        ]
+    };
+    let rows = vec![
+        row("O_C, comprehensive (eq. 27)", &|i| i.comprehensive),
+        row("  O1 part, 2/π·atan O1", &|i| atan(i.o1)),
+        row("  O2 part", &|i| atan(i.o2)),
+        row("  O3 part", &|i| atan(i.o3)),
+        row("  D part", &|i| atan(i.dispersion_m2)),
+        row("  U part", &|i| atan(i.evenness)),
+        row("O1, mean of singular values", &|i| i.o1),
+        row("O2, inverse condition number", &|i| i.o2),
+        row("O3, smallest singular value", &|i| i.o3),
+        row("O4, noise amplification", &|i| i.o4),
+        row("O5, A-optimality", &|i| i.o5),
+        row("O6, Φp-optimality", &|i| i.o6),
+        row("D, dispersion (m²)", &|i| i.dispersion_m2),
+        row("U, evenness", &|i| i.evenness),
+    ];
+    let all = format!("chosen, all {parameter_count}");
+    let random = format!("random, mean of {}", outcome.random.sets);
+    let mut text = table(&["index", &random, "min … max", "chosen", &all], rows);
+    let dropped = if outcome.dropped_parameters.is_empty() { "none".to_owned() } else { outcome.dropped_parameters.join(", ") };
+    text.push_str(&format!(
+        "\n{} configurations by {}: {} evaluations, {} colliding configurations refused, stopped: {}.\n\
+         Identifiable: {} of {parameter_count} parameters; held at nominal: {dropped}.\n\
+         Singular values are of the unscaled SI Jacobian on the identifiable subspace; the last column counts all {parameter_count}.\n\
+         Evenness: reachable workspace {:.3}, bounding cube {:.3}.\n",
+        outcome.configurations.len(),
+        outcome.method,
+        outcome.evaluations,
+        outcome.rejections,
+        stop(outcome.stop),
+        outcome.indexes.rank,
+        outcome.evenness_domains.reachable,
+        outcome.evenness_domains.bounding_cube,
+    ));
+    text
+}
+
+fn stop(reason: StopReason) -> &'static str {
+    match reason {
+        StopReason::IterationLimit => "all iterations made",
+        StopReason::Converged => "no particle moved any more",
+        StopReason::Drawn => "drawn once",
+    }
+}
+
+/// Errors before and after, and how the fit went.
+#[must_use]
+pub fn identification(identification: &Identification) -> String {
+    let mut rows = Vec::new();
+    let mut add = |name: &str, before: Option<&Errors>, after: Option<&Errors>| {
+        for (label, errors) in [("nominal", before), ("identified", after)] {
+            let Some(errors) = errors else { continue };
+            rows.push(error_row(&format!("{name} ({}), {label}", errors.count), errors));
+        }
+    };
+    add("fitted", Some(&identification.nominal), Some(&identification.fitted));
+    add("held out", identification.held_out_nominal.as_ref(), identification.held_out.as_ref());
+    let header = [
+        "configurations, model",
+        "position mean (mm)",
+        "RMS",
+        "min",
+        "max",
+        "attitude mean (°)",
+        "RMS",
+        "min",
+        "max",
+    ];
+    let mut text = table(&header, rows);
+    let dropped = identification.parameters.iter().filter(|parameter| parameter.dropped).count();
+    text.push_str(&format!(
+        "\n{} after {} steps ({}). Rank {} of {} parameters, {dropped} held at nominal; {} equations; residuals {:.2} × declared noise.\n",
+        if identification.converged { "Converged" } else { "NOT CONVERGED" },
+        identification.iterations,
+        identification.reason,
+        identification.rank,
+        identification.parameters.len(),
+        identification.equations,
+        identification.residual_scale,
+    ));
+    for note in &identification.notes {
+        text.push_str(&format!("Note: {note}.\n"));
+    }
+    text
+}
+
+fn error_row(name: &str, errors: &Errors) -> Vec<String> {
+    let mut row = vec![name.to_owned()];
+    let mut add = |summary: &Summary, factor: f64| {
+        row.extend([summary.mean, summary.rms, summary.min, summary.max].map(|value| number(value * factor)));
+    };
+    add(&errors.position_m, 1e3);
+    match &errors.rotation_rad {
+        Some(summary) => add(summary, 180.0 / std::f64::consts::PI),
+        None => row.extend((0..4).map(|_| "–".to_owned())),
+    }
+    row
+}
+
+/// Every identifiable combination with its estimate and 95 % interval, in µm and µrad.
+#[must_use]
+pub fn combinations(identification: &Identification) -> String {
+    let rows = identification
+        .combinations
+        .iter()
+        .map(|combination| {
+            let unit = if combination.unit == "m" { "µm" } else { "µrad" };
+            let micro = |value: f64| format!("{:.2}", value * 1e6);
+            vec![
+                combination.expression.clone(),
+                unit.to_owned(),
+                micro(combination.estimate),
+                micro(combination.standard_error),
+                micro(combination.interval95[0]),
+                micro(combination.interval95[1]),
+            ]
+        })
+        .collect();
+    table(&["identifiable combination", "unit", "change", "standard error", "95 % from", "to"], rows)
+}
+
+/// Four significant digits, in plain notation where that is readable.
+#[must_use]
+pub fn number(value: f64) -> String {
+    let size = value.abs();
+    if value == 0.0 {
+        "0".to_owned()
+    } else if !(1e-4..1e6).contains(&size) {
+        format!("{value:.3e}")
+    } else {
+        let before = (libm::floor(libm::log10(size)) as i32 + 1).max(0);
+        format!("{value:.*}", usize::try_from((4 - before).clamp(0, 6)).unwrap_or(0))
+    }
+}
