@@ -21,9 +21,9 @@ use super::play::{Load, Play};
 use super::true_arm::{TrueArm, turn_about_z};
 use crate::frames::Pose;
 
-/// A step overshoots the edge of the clearance by a quarter of it, so that the limit, which rapier notices only once it is
-/// passed, takes hold in the next step. An error along the circle shrinks to a quarter of itself per step, with the sign changed.
-const REACH_PER_STEP: f64 = 1.25;
+/// A step carries a coordinate this far beyond the edge of its clearance, from the middle: rapier notices a limit once it is
+/// passed. What exceeds 1 is also the factor by which an error along the circle shrinks per step (its sign changes).
+const REACH_PER_STEP: f64 = 1.05;
 
 /// Stiffness of the limits: the angle that their spring would turn in one step, rad. A limit holds a coordinate at the edge
 /// times `1 + REACH_PER_STEP / STIFFNESS²`, and each step leaves `2 / STIFFNESS` of what was beyond it.
