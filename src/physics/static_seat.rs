@@ -21,7 +21,8 @@ pub(super) fn static_seats(arm: &TrueArm, joints: &[f64], growth: &[f64], rounds
     plays
 }
 
-fn seats_about(arm: &TrueArm, joints: &[f64], growth: &[f64], plays: &[Play]) -> Vec<Play> {
+/// The solution of the linear programme about `plays`.
+pub(super) fn seats_about(arm: &TrueArm, joints: &[f64], growth: &[f64], plays: &[Play]) -> Vec<Play> {
     static_loads(arm, joints, growth, plays).iter().enumerate().map(|(joint, load)| seat(arm, joint, load)).collect()
 }
 
@@ -40,7 +41,7 @@ fn seat(arm: &TrueArm, joint: usize, load: &Load) -> Play {
 }
 
 /// The loads on the plays of an arm whose joints lie at `plays`.
-pub(super) fn static_loads(arm: &TrueArm, joints: &[f64], growth: &[f64], plays: &[Play]) -> Vec<Load> {
+fn static_loads(arm: &TrueArm, joints: &[f64], growth: &[f64], plays: &[Play]) -> Vec<Load> {
     let mut base_from_reached = Pose::identity();
     let mut frames = Vec::with_capacity(arm.joint_count());
     let mut weights = Vec::with_capacity(arm.joint_count());
