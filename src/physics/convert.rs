@@ -25,8 +25,5 @@ pub(super) fn pose_to_rapier(pose: &Pose) -> RapierPose {
 /// The same pose from rapier. The quaternion is normalised: products along the chain lose a few ulp of its length.
 pub(super) fn pose_from_rapier(pose: &RapierPose) -> Pose {
     let (r, t) = (pose.rotation, pose.translation);
-    Pose::from_parts(
-        Translation3::new(t.x, t.y, t.z),
-        UnitQuaternion::new_normalize(Quaternion::new(r.w, r.x, r.y, r.z)),
-    )
+    Pose::from_parts(Translation3::new(t.x, t.y, t.z), UnitQuaternion::new_normalize(Quaternion::new(r.w, r.x, r.y, r.z)))
 }

@@ -2,11 +2,11 @@
 
 use super::clearance::{Clearance, Seat};
 use super::error::PhysicsError;
-use super::play::{Load, Play};
+use super::play::{Decision, Play};
 use super::settling::{Settled, Settling, Start};
 use super::static_seat::static_seats;
 use super::true_arm::TrueArm;
-use super::world::{World, indentation};
+use super::world::{TIME_STEP_S, World, indentation};
 use crate::arm::Arm;
 use crate::frames::{Pose, rotation_vector};
 
@@ -23,15 +23,10 @@ impl PhysicalArm {
     ///
     /// # Errors
     /// If a moving link has no inertial or an impossible one, a count is wrong, or a number is out of range.
-    pub fn new(
-        arm: &Arm,
-        parameters_true: &[f64],
-        clearances: &[Clearance],
-        settling: Settling,
-    ) -> Result<Self, PhysicsError> {
+    pub fn new(arm: &Arm, parameters_true: &[f64], clearances: &[Clearance], settling: Settling) -> Result<Self, PhysicsError> {
         settling.check()?;
         let arm = TrueArm::new(arm, parameters_true, clearances, settling.holding_ratio)?;
-        let world = World::new(&arm, settling.time_step_s);
+        let world = World::new(&arm);
         Ok(PhysicalArm { arm, settling, world })
     }
 
@@ -48,48 +43,50 @@ impl PhysicalArm {
         let count = self.arm.joint_count();
         assert_eq!(joints.len(), count, "one coordinate per joint");
         assert_eq!(growth.len(), count + 1, "one growth per segment");
-        let mut plays = match self.settling.start {
-            Start::Centre => vec![Play::CENTRE; count],
-            Start::Predicted => self.predicted(joints, growth),
-        };
+        let mut plays = vec![Play::CENTRE; count];
         self.world.place(&self.arm, joints, growth, &plays);
+        let mut loads = self.world.loads();
+        // Made once, so that a load near the threshold cannot let a coordinate go and hold it again half-way.
+        let decisions = self.arm.decisions(&loads);
+        if self.settling.start == Start::Predicted && self.world.freedoms() > 0 {
+            plays = self.predicted(joints, growth, &decisions);
+            self.world.place(&self.arm, joints, growth, &plays);
+            loads = self.world.loads();
+        }
         let mut base_from_tool = self.world.base_from_tool();
-        let (mut steps, mut moved_m, mut moved_rad, mut converged) = (0, 0.0, 0.0, true);
-        if self.world.freedoms() > 0 {
-            converged = false;
-            while !converged && steps < self.settling.steps_max {
-                let loads = self.world.loads(&self.arm);
-                self.world.damp(&self.arm, &loads);
-                self.world.step();
-                steps += 1;
-                plays = self.world.plays(&self.arm);
-                self.world.place(&self.arm, joints, growth, &plays);
-                let reached = self.world.base_from_tool();
-                (moved_m, moved_rad) = distance(&reached, &base_from_tool);
-                base_from_tool = reached;
-                converged = moved_m < self.settling.tolerance_m && moved_rad < self.settling.tolerance_rad;
-            }
+        let (mut steps, mut moved_m, mut moved_rad) = (0, 0.0, 0.0);
+        let mut converged = self.world.freedoms() == 0;
+        while !converged && steps < self.settling.steps_max {
+            self.world.damp(&self.arm, &loads, &decisions);
+            self.world.step();
+            steps += 1;
+            plays = self.world.plays();
+            self.world.place(&self.arm, joints, growth, &plays);
+            loads = self.world.loads();
+            let reached = self.world.base_from_tool();
+            (moved_m, moved_rad) = distance(&reached, &base_from_tool);
+            base_from_tool = reached;
+            converged = moved_m < self.settling.tolerance_m && moved_rad < self.settling.tolerance_rad;
         }
         let base_from_link = std::iter::once(self.arm.base_from_base_link)
             .chain((0..count).map(|joint| self.world.base_from_link(joint)))
             .collect();
-        let loads = self.world.loads(&self.arm);
-        let seats = plays.iter().zip(&loads).enumerate().map(|(joint, (play, load))| self.seat(joint, play, load)).collect();
+        let seats = plays.iter().zip(&decisions).enumerate().map(|(joint, (play, by))| seat(joint, play, by)).collect();
         Settled {
             base_from_tool,
             base_from_link,
             settling_error_m: moved_m,
             settling_error_rad: moved_rad,
             steps,
-            simulated_time_s: steps as f64 * self.settling.time_step_s,
+            simulated_time_s: steps as f64 * TIME_STEP_S,
             converged,
             seats,
         }
     }
 
     /// Where statics puts the joints, pressed against the limits as rapier holds them.
-    fn predicted(&self, joints: &[f64], growth: &[f64]) -> Vec<Play> {
-        let mut plays = static_seats(&self.arm, joints, growth, 1);
+    fn predicted(&self, joints: &[f64], growth: &[f64], decisions: &[Decision]) -> Vec<Play> {
+        let mut plays = static_seats(&self.arm, joints, growth, decisions, 2);
         for play in &mut plays {
             play.radial *= indentation();
             play.axial *= indentation();
@@ -97,18 +94,17 @@ impl PhysicalArm {
         }
         plays
     }
+}
 
-    fn seat(&self, joint: usize, play: &Play, load: &Load) -> Seat {
-        let [radial_by, axial_by, tilt_by] = self.arm.seated_by(joint, load.radial.norm(), load.axial, load.tilt.norm());
-        Seat {
-            joint,
-            radial_in_joint: play.radial.into(),
-            axial_in_joint: play.axial,
-            tilt_in_joint: play.tilt.into(),
-            radial_by,
-            axial_by,
-            tilt_by,
-        }
+fn seat(joint: usize, play: &Play, by: &Decision) -> Seat {
+    Seat {
+        joint,
+        radial_in_joint: play.radial.into(),
+        axial_in_joint: play.axial,
+        tilt_in_joint: play.tilt.into(),
+        radial_by: by.radial,
+        axial_by: by.axial,
+        tilt_by: by.tilt,
     }
 }
 
@@ -120,8 +116,8 @@ fn distance(reached: &Pose, left: &Pose) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::clearance::SeatedBy;
-    use super::super::static_seat::seats_about;
+    use super::super::clearance::{LARGEST_LENGTH_M, LARGEST_TILT_RAD, SeatedBy};
+    use super::super::static_seat::{seats_about, static_loads};
     use super::super::test_arms;
     use super::*;
     use crate::frames::pose_error;
@@ -135,7 +131,11 @@ mod tests {
         let mut stream = stream(1, "test/physics/forward");
         let mut worst: f64 = 0.0;
         for configuration in 0..200 {
-            let kinds = if configuration % 2 == 0 { [Revolute; 8] } else { [Revolute, Revolute, Prismatic, Revolute, Prismatic, Revolute, Revolute, Revolute] };
+            let kinds = if configuration % 2 == 0 {
+                [Revolute; 8]
+            } else {
+                [Revolute, Revolute, Prismatic, Revolute, Prismatic, Revolute, Revolute, Revolute]
+            };
             let arm = test_arms::arm(&kinds, configuration % 3 == 0);
             let parameters = test_arms::parameters_true(&arm, &mut stream);
             let joints = test_arms::configuration(&arm, &mut stream);
@@ -187,7 +187,10 @@ mod tests {
     fn mixed(configuration: usize) -> Arm {
         use JointKind::{Prismatic, Revolute};
         let slide = if configuration.is_multiple_of(2) { Prismatic } else { Revolute };
-        test_arms::arm(&[Revolute, Revolute, slide, Revolute, Revolute, slide, Revolute, Revolute], configuration.is_multiple_of(3))
+        test_arms::arm(
+            &[Revolute, Revolute, slide, Revolute, Revolute, slide, Revolute, Revolute],
+            configuration.is_multiple_of(3),
+        )
     }
 
     #[test]
@@ -195,7 +198,8 @@ mod tests {
         for (name, largest) in KINDS {
             let mut stream = stream(2, &format!("test/physics/seats/{name}"));
             let (mut first_m, mut first_rad, mut last_m, mut last_rad): (f64, f64, f64, f64) = (0.0, 0.0, 0.0, 0.0);
-            let (mut steps, mut error_m, mut error_rad, mut decided, mut held): (usize, f64, f64, usize, usize) = (0, 0.0, 0.0, 0, 0);
+            let (mut steps, mut error_m, mut error_rad, mut decided, mut held): (usize, f64, f64, usize, usize) =
+                (0, 0.0, 0.0, 0, 0);
             for configuration in 0..300 {
                 let arm = mixed(configuration);
                 let parameters = test_arms::parameters_true(&arm, &mut stream);
@@ -210,8 +214,9 @@ mod tests {
                 error_rad = error_rad.max(settled.settling_error_rad);
                 // The oracle holds nothing: every load decides.
                 let oracle = TrueArm::new(&arm, &parameters, &clearances, 1e-12).unwrap();
-                let first = static_seats(&oracle, &joints, &growth, 1);
-                let last = seats_about(&oracle, &joints, &growth, &plays(&settled));
+                let all = oracle.decisions(&static_loads(&oracle, &joints, &growth, &[Play::CENTRE; 8]));
+                let first = static_seats(&oracle, &joints, &growth, &all, 1);
+                let last = seats_about(&oracle, &joints, &growth, &all, &plays(&settled));
                 for (seat, (first, last)) in settled.seats.iter().zip(first.iter().zip(&last)) {
                     let mut compare = |by, ours: Vector2<f64>, first: Vector2<f64>, last: Vector2<f64>, tilt| match by {
                         SeatedBy::Fit => assert_eq!(ours, Vector2::zeros()),
@@ -276,7 +281,13 @@ mod tests {
                 // Half of the samples are anywhere, half on the edge near the seat, where the energy is flattest.
                 let near = nalgebra::Rotation2::new(0.01 * stream.normal()) * at;
                 let anywhere = Vector2::new(angle.cos(), angle.sin()) * radius * share.sqrt();
-                if by != SeatedBy::Load { at } else if stream.unit() < 0.5 { near } else { anywhere }
+                if by != SeatedBy::Load {
+                    at
+                } else if stream.unit() < 0.5 {
+                    near
+                } else {
+                    anywhere
+                }
             };
             for _ in 0..2000 {
                 let other: Vec<Play> = settled
@@ -311,7 +322,11 @@ mod tests {
             let mut backwards: Vec<_> = configurations.iter().rev().map(|joints| settle(&mut used, joints)).collect();
             backwards.reverse();
             let threads: Vec<_> = std::thread::scope(|scope| {
-                let handles: Vec<_> = configurations.iter().map(|joints| scope.spawn(|| settle(&mut fresh(), joints))).collect();
+                let spawn = |joints| {
+                    let mut moved = fresh();
+                    scope.spawn(move || settle(&mut moved, joints))
+                };
+                let handles: Vec<_> = configurations.iter().map(spawn).collect();
                 handles.into_iter().map(|handle| handle.join().unwrap()).collect()
             });
             assert_eq!(alone, in_order);
@@ -328,17 +343,57 @@ mod tests {
             let parameters = test_arms::parameters_true(&arm, &mut stream);
             let clearances = fractions(KINDS[3].1, &mut stream);
             let joints = test_arms::configuration(&arm, &mut stream);
-            let settle = |settling| PhysicalArm::new(&arm, &parameters, &clearances, settling).unwrap().settle(&joints, &[1.0; 9]);
+            let settle =
+                |settling| PhysicalArm::new(&arm, &parameters, &clearances, settling).unwrap().settle(&joints, &[1.0; 9]);
             let rest = settle(Settling { tolerance_m: 1e-13, tolerance_rad: 1e-13, ..Settling::default() });
             assert!(rest.converged);
             for (start, steps_max) in [(Start::Centre, 2), (Start::Centre, 3), (Start::Predicted, 1), (Start::Predicted, 50)] {
                 let settled = settle(Settling { start, steps_max, ..Settling::default() });
                 let (left_m, left_rad) = distance(&settled.base_from_tool, &rest.base_from_tool);
-                assert!(left_m <= settled.settling_error_m + 1e-13, "{start:?}: {left_m:e} m left, {:e}", settled.settling_error_m);
+                assert!(
+                    left_m <= settled.settling_error_m + 1e-13,
+                    "{start:?}: {left_m:e} m left, {:e}",
+                    settled.settling_error_m
+                );
                 assert!(left_rad <= settled.settling_error_rad + 1e-13, "{start:?}: {left_rad:e} rad left");
                 assert_eq!(settled.converged, steps_max == 50);
             }
         }
+    }
+
+    #[test]
+    fn the_largest_clearances_still_settle() {
+        let mut stream = stream(6, "test/physics/largest");
+        let largest = Clearance { radial_m: LARGEST_LENGTH_M, axial_m: LARGEST_LENGTH_M, tilt_rad: LARGEST_TILT_RAD };
+        for configuration in 0..40 {
+            let arm = mixed(configuration);
+            let parameters = test_arms::parameters_true(&arm, &mut stream);
+            let joints = test_arms::configuration(&arm, &mut stream);
+            let settled = |start| {
+                let settling = Settling { start, ..Settling::default() };
+                let settled = PhysicalArm::new(&arm, &parameters, &[largest; 8], settling).unwrap().settle(&joints, &[1.0; 9]);
+                assert!(settled.converged && settled.steps < 20, "{} steps", settled.steps);
+                for seat in settled.seats.iter().filter(|seat| seat.radial_by == SeatedBy::Load) {
+                    let reached = Vector2::from(seat.radial_in_joint).norm() / largest.radial_m;
+                    assert!((reached - 1.0).abs() < 1e-6, "joint {} at {reached} of its clearance", seat.joint);
+                }
+            };
+            settled(Start::Centre);
+            settled(Start::Predicted);
+        }
+    }
+
+    #[test]
+    fn without_gravity_nothing_seats() {
+        let mut arm = test_arms::eight();
+        arm.gravity_in_base.fill(0.0);
+        let clearance = Clearance { radial_m: 30e-6, axial_m: 20e-6, tilt_rad: 100e-6 };
+        let nominal = arm.chain.nominal();
+        let settled =
+            PhysicalArm::new(&arm, &nominal, &[clearance; 8], Settling::default()).unwrap().settle(&[0.5; 8], &[1.0; 9]);
+        assert!(settled.converged);
+        assert!(pose_error(&settled.base_from_tool, &arm.chain.at_nominal().forward(&[0.5; 8])).amax() < 1e-14);
+        assert!(settled.seats.iter().all(|seat| seat.radial_by == SeatedBy::Friction && seat.tilt_by == SeatedBy::Friction));
     }
 
     #[test]
@@ -395,7 +450,8 @@ mod tests {
     fn what_cannot_be_simulated_is_refused() {
         let arm = test_arms::eight();
         let nominal = arm.chain.nominal();
-        let new = |arm: &Arm, clearances: &[Clearance], settling| PhysicalArm::new(arm, &nominal, clearances, settling).err().unwrap();
+        let new =
+            |arm: &Arm, clearances: &[Clearance], settling| PhysicalArm::new(arm, &nominal, clearances, settling).err().unwrap();
         let mut bare = arm.clone();
         bare.links[3].inertial = None;
         let error = new(&bare, &[Clearance::NONE; 8], Settling::default());
@@ -403,9 +459,9 @@ mod tests {
         let error = new(&arm, &[Clearance::NONE; 7], Settling::default());
         assert_eq!(error.to_string(), "7 clearances, expected 8");
         let error = new(&arm, &[Clearance { radial_m: -1e-6, ..Clearance::NONE }; 8], Settling::default());
-        assert_eq!(error.to_string(), "radial clearance of joint 0 is -0.000001, allowed is 0 to 0.01 (m)");
-        let error = new(&arm, &[Clearance::NONE; 8], Settling { time_step_s: f64::NAN, ..Settling::default() });
-        assert!(matches!(error, PhysicsError::BadSetting { what: "time_step_s", .. }));
+        assert_eq!(error.to_string(), "radial clearance of joint 0 is -0.000001, allowed is 0 to 0.001 (m)");
+        let error = new(&arm, &[Clearance::NONE; 8], Settling { tolerance_m: f64::NAN, ..Settling::default() });
+        assert!(matches!(error, PhysicsError::BadSetting { what: "tolerance_m", .. }));
         let mut heavy = arm.clone();
         heavy.links[8].inertial.as_mut().unwrap().inertia_in_link[(0, 0)] = -1.0;
         assert!(matches!(new(&heavy, &[Clearance::NONE; 8], Settling::default()), PhysicsError::BadInertial { .. }));

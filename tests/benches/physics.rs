@@ -51,13 +51,13 @@ fn settle(bencher: Bencher, joints_with_clearance: usize, start: Start) {
     let clearance = Clearance { radial_m: 30e-6, axial_m: 20e-6, tilt_rad: 100e-6 };
     let clearances: Vec<Clearance> =
         (0..8).map(|joint| if joint < joints_with_clearance { clearance } else { Clearance::NONE }).collect();
-    let mut physical =
-        PhysicalArm::new(&arm, &arm.chain.nominal(), &clearances, Settling { start, ..Settling::default() }).expect("a valid arm");
+    let mut physical = PhysicalArm::new(&arm, &arm.chain.nominal(), &clearances, Settling { start, ..Settling::default() })
+        .expect("a valid arm");
     let mut stream = stream(1, "bench/physics");
     let configurations: Vec<Vec<f64>> = (0..POSES).map(|_| (0..8).map(|_| stream.uniform(-3.0, 3.0)).collect()).collect();
-    bencher.counter(ItemsCount::new(POSES)).bench_local(|| {
-        configurations.iter().map(|joints| physical.settle(joints, &[1.0; 9]).steps).sum::<usize>()
-    });
+    bencher
+        .counter(ItemsCount::new(POSES))
+        .bench_local(|| configurations.iter().map(|joints| physical.settle(joints, &[1.0; 9]).steps).sum::<usize>());
 }
 
 #[divan::bench(args = [0, 1, 8], sample_count = 20)]
