@@ -8,8 +8,8 @@
 //! ideal), every clearance in its middle. The load on each play is gravity through rapier's Jacobians; where it is below the
 //! friction of the fit ([`Settling::holding_ratio`]) the coordinate is undecided and stays in the middle. Then rapier steps,
 //! heavily damped and from rest each time, until the tool no longer moves. `static_seat` solves the same by statics, without
-//! rapier: it is where a simulation starts by default ([`Start::Predicted`]) and what tests compare a simulation from the middle
-//! ([`Start::Centre`]) with.
+//! rapier: tests compare a simulation from the middle ([`Start::Centre`]) with it, and one may start there to save steps
+//! ([`Start::Predicted`]).
 //!
 //! How exact it is (tests and `tests/benches/physics.rs`; eight joints, clearances to 60 µm and 200 µrad in all of them):
 //! without effects, forward kinematics to 2e-15 m. With clearance, the linear programme about the seat to 4e-11 m and

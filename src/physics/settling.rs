@@ -7,9 +7,9 @@ use crate::frames::Pose;
 /// Where the joints lie in their clearances when the simulation starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
-    /// In the middle of every clearance.
+    /// In the middle of every clearance: rapier finds the seat unaided.
     Centre,
-    /// Where rigid statics predicts them to rest.
+    /// Where rigid statics predicts them to rest: a quarter to a half faster.
     Predicted,
 }
 
@@ -35,7 +35,7 @@ pub struct Settling {
 
 impl Default for Settling {
     fn default() -> Self {
-        Settling { start: Start::Predicted, tolerance_m: 1e-9, tolerance_rad: 1e-9, steps_max: 50, holding_ratio: 0.05 }
+        Settling { start: Start::Centre, tolerance_m: 1e-9, tolerance_rad: 1e-9, steps_max: 50, holding_ratio: 0.05 }
     }
 }
 

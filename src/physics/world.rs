@@ -12,7 +12,7 @@
 use nalgebra::{Vector2, Vector3};
 use rapier3d::dynamics::{
     GenericJoint, IntegrationParameters, JointAxesMask, JointAxis, MassProperties, Multibody, MultibodyIndex, MultibodyJoint,
-    RigidBodyBuilder, RigidBodyHandle, SpringCoefficients,
+    MultibodyLink, RigidBodyBuilder, RigidBodyHandle, SpringCoefficients,
 };
 use rapier3d::pipeline::PhysicsWorld;
 
@@ -132,6 +132,10 @@ impl World {
         self.rapier.multibody_joints.get_multibody_mut_internal(self.multibody).expect("the multibody is never removed")
     }
 
+    fn link(&self, link: usize) -> &MultibodyLink {
+        self.multibody().link(link).expect("links are never removed")
+    }
+
     /// Number of free coordinates.
     pub(super) fn freedoms(&self) -> usize {
         self.multibody().ndofs()
@@ -189,8 +193,7 @@ impl World {
 
     /// Where the joints lie in their clearances, read from rapier's coordinates.
     pub(super) fn plays(&self) -> Vec<Play> {
-        let multibody = self.multibody();
-        let coordinates = |link: usize| multibody.link(link).expect("links are never removed").joint.coords();
+        let coordinates = |link: usize| self.link(link).joint.coords();
         let mut plays = Vec::with_capacity(self.links.len());
         for (joint, links) in self.links.iter().enumerate() {
             let [radial, leaning] = self.directions[joint];
@@ -271,7 +274,7 @@ impl World {
     }
 
     fn base_from(&self, link: usize) -> Pose {
-        pose_from_rapier(self.multibody().link(link).expect("links are never removed").local_to_world())
+        pose_from_rapier(self.link(link).local_to_world())
     }
 }
 
