@@ -18,8 +18,8 @@ pub struct Clearance {
 }
 
 /// A play is a small motion: beyond this the seat is no longer what a bearing does, and a unit was probably mistaken.
-const LARGEST_LENGTH_M: f64 = 0.01;
-const LARGEST_TILT_RAD: f64 = 0.05;
+pub(super) const LARGEST_LENGTH_M: f64 = 1e-3;
+pub(super) const LARGEST_TILT_RAD: f64 = 0.01;
 
 impl Clearance {
     /// No play at all.
@@ -51,14 +51,14 @@ impl Clearance {
 pub enum SeatedBy {
     /// There is no clearance: the fit itself.
     Fit,
-    /// The load pushes the coordinate to the edge of its clearance.
+    /// Decided: the load pushes the coordinate to the edge of its clearance.
     Load,
-    /// The load is too small to overcome the friction of the fit ([`super::Settling::holding_ratio`]): the coordinate stays
-    /// where it was, which is the middle of the clearance.
+    /// Undecided: with every joint in the middle of its clearance, the load is too small to overcome the friction of the fit
+    /// ([`super::Settling::holding_ratio`]), and the coordinate stays in the middle.
     Friction,
 }
 
-/// Where a joint lies in its clearance, and what the load on it is. Vectors are in the joint frame (see [`Clearance`]).
+/// Where a joint lies in its clearance, and why. Vectors are in the joint frame (see [`Clearance`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seat {
     /// Index of the joint.

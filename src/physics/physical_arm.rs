@@ -2,11 +2,11 @@
 
 use super::clearance::{Clearance, Seat};
 use super::error::PhysicsError;
-use super::play::{Load, Play};
+use super::play::{Decision, Play};
 use super::settling::{Settled, Settling, Start};
 use super::static_seat::static_seats;
 use super::true_arm::TrueArm;
-use super::world::{World, indentation};
+use super::world::{TIME_STEP_S, World, indentation};
 use crate::arm::Arm;
 use crate::frames::{Pose, rotation_vector};
 
@@ -26,7 +26,7 @@ impl PhysicalArm {
     pub fn new(arm: &Arm, parameters_true: &[f64], clearances: &[Clearance], settling: Settling) -> Result<Self, PhysicsError> {
         settling.check()?;
         let arm = TrueArm::new(arm, parameters_true, clearances, settling.holding_ratio)?;
-        let world = World::new(&arm, settling.time_step_s);
+        let world = World::new(&arm);
         Ok(PhysicalArm { arm, settling, world })
     }
 
@@ -43,48 +43,50 @@ impl PhysicalArm {
         let count = self.arm.joint_count();
         assert_eq!(joints.len(), count, "one coordinate per joint");
         assert_eq!(growth.len(), count + 1, "one growth per segment");
-        let mut plays = match self.settling.start {
-            Start::Centre => vec![Play::CENTRE; count],
-            Start::Predicted => self.predicted(joints, growth),
-        };
+        let mut plays = vec![Play::CENTRE; count];
         self.world.place(&self.arm, joints, growth, &plays);
+        let mut loads = self.world.loads();
+        // Made once, so that a load near the threshold cannot let a coordinate go and hold it again half-way.
+        let decisions = self.arm.decisions(&loads);
+        if self.settling.start == Start::Predicted && self.world.freedoms() > 0 {
+            plays = self.predicted(joints, growth, &decisions);
+            self.world.place(&self.arm, joints, growth, &plays);
+            loads = self.world.loads();
+        }
         let mut base_from_tool = self.world.base_from_tool();
-        let (mut steps, mut moved_m, mut moved_rad, mut converged) = (0, 0.0, 0.0, true);
-        if self.world.freedoms() > 0 {
-            converged = false;
-            while !converged && steps < self.settling.steps_max {
-                let loads = self.world.loads(&self.arm);
-                self.world.damp(&self.arm, &loads);
-                self.world.step();
-                steps += 1;
-                plays = self.world.plays(&self.arm);
-                self.world.place(&self.arm, joints, growth, &plays);
-                let reached = self.world.base_from_tool();
-                (moved_m, moved_rad) = distance(&reached, &base_from_tool);
-                base_from_tool = reached;
-                converged = moved_m < self.settling.tolerance_m && moved_rad < self.settling.tolerance_rad;
-            }
+        let (mut steps, mut moved_m, mut moved_rad) = (0, 0.0, 0.0);
+        let mut converged = self.world.freedoms() == 0;
+        while !converged && steps < self.settling.steps_max {
+            self.world.damp(&self.arm, &loads, &decisions);
+            self.world.step();
+            steps += 1;
+            plays = self.world.plays();
+            self.world.place(&self.arm, joints, growth, &plays);
+            loads = self.world.loads();
+            let reached = self.world.base_from_tool();
+            (moved_m, moved_rad) = distance(&reached, &base_from_tool);
+            base_from_tool = reached;
+            converged = moved_m < self.settling.tolerance_m && moved_rad < self.settling.tolerance_rad;
         }
         let base_from_link = std::iter::once(self.arm.base_from_base_link)
             .chain((0..count).map(|joint| self.world.base_from_link(joint)))
             .collect();
-        let loads = self.world.loads(&self.arm);
-        let seats = plays.iter().zip(&loads).enumerate().map(|(joint, (play, load))| self.seat(joint, play, load)).collect();
+        let seats = plays.iter().zip(&decisions).enumerate().map(|(joint, (play, by))| seat(joint, play, by)).collect();
         Settled {
             base_from_tool,
             base_from_link,
             settling_error_m: moved_m,
             settling_error_rad: moved_rad,
             steps,
-            simulated_time_s: steps as f64 * self.settling.time_step_s,
+            simulated_time_s: steps as f64 * TIME_STEP_S,
             converged,
             seats,
         }
     }
 
     /// Where statics puts the joints, pressed against the limits as rapier holds them.
-    fn predicted(&self, joints: &[f64], growth: &[f64]) -> Vec<Play> {
-        let mut plays = static_seats(&self.arm, joints, growth, 1);
+    fn predicted(&self, joints: &[f64], growth: &[f64], decisions: &[Decision]) -> Vec<Play> {
+        let mut plays = static_seats(&self.arm, joints, growth, decisions, 2);
         for play in &mut plays {
             play.radial *= indentation();
             play.axial *= indentation();
@@ -92,18 +94,17 @@ impl PhysicalArm {
         }
         plays
     }
+}
 
-    fn seat(&self, joint: usize, play: &Play, load: &Load) -> Seat {
-        let [radial_by, axial_by, tilt_by] = self.arm.seated_by(joint, load.radial.norm(), load.axial, load.tilt.norm());
-        Seat {
-            joint,
-            radial_in_joint: play.radial.into(),
-            axial_in_joint: play.axial,
-            tilt_in_joint: play.tilt.into(),
-            radial_by,
-            axial_by,
-            tilt_by,
-        }
+fn seat(joint: usize, play: &Play, by: &Decision) -> Seat {
+    Seat {
+        joint,
+        radial_in_joint: play.radial.into(),
+        axial_in_joint: play.axial,
+        tilt_in_joint: play.tilt.into(),
+        radial_by: by.radial,
+        axial_by: by.axial,
+        tilt_by: by.tilt,
     }
 }
 
@@ -115,12 +116,14 @@ fn distance(reached: &Pose, left: &Pose) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::clearance::{LARGEST_LENGTH_M, LARGEST_TILT_RAD, SeatedBy};
+    use super::super::static_seat::{seats_about, static_loads};
     use super::super::test_arms;
     use super::*;
     use crate::frames::pose_error;
     use crate::kinematics::JointKind;
-    use crate::seed::stream;
-    use nalgebra::Translation3;
+    use crate::seed::{Stream, stream};
+    use nalgebra::{Translation3, Vector2};
 
     #[test]
     fn without_effects_it_is_forward_kinematics() {
@@ -161,5 +164,336 @@ mod tests {
         }
         println!("worst deviation from forward kinematics: {worst:e}");
         assert!(worst < 1e-9);
+    }
+
+    const KINDS: [(&str, Clearance); 4] = [
+        ("radial", Clearance { radial_m: 60e-6, axial_m: 0.0, tilt_rad: 0.0 }),
+        ("axial", Clearance { radial_m: 0.0, axial_m: 60e-6, tilt_rad: 0.0 }),
+        ("tilt", Clearance { radial_m: 0.0, axial_m: 0.0, tilt_rad: 200e-6 }),
+        ("all", Clearance { radial_m: 60e-6, axial_m: 60e-6, tilt_rad: 200e-6 }),
+    ];
+
+    fn fractions(largest: Clearance, stream: &mut Stream) -> Vec<Clearance> {
+        let mut fraction = || stream.uniform(0.2, 1.0);
+        (0..8)
+            .map(|_| Clearance {
+                radial_m: fraction() * largest.radial_m,
+                axial_m: fraction() * largest.axial_m,
+                tilt_rad: fraction() * largest.tilt_rad,
+            })
+            .collect()
+    }
+
+    fn mixed(configuration: usize) -> Arm {
+        use JointKind::{Prismatic, Revolute};
+        let slide = if configuration.is_multiple_of(2) { Prismatic } else { Revolute };
+        test_arms::arm(
+            &[Revolute, Revolute, slide, Revolute, Revolute, slide, Revolute, Revolute],
+            configuration.is_multiple_of(3),
+        )
+    }
+
+    #[test]
+    fn cold_seats_are_those_of_the_linear_programme() {
+        for (name, largest) in KINDS {
+            let mut stream = stream(2, &format!("test/physics/seats/{name}"));
+            let (mut first_m, mut first_rad, mut last_m, mut last_rad): (f64, f64, f64, f64) = (0.0, 0.0, 0.0, 0.0);
+            let mut steps_all = 0;
+            let (mut steps, mut error_m, mut error_rad, mut decided, mut held): (usize, f64, f64, usize, usize) =
+                (0, 0.0, 0.0, 0, 0);
+            for configuration in 0..300 {
+                let arm = mixed(configuration);
+                let parameters = test_arms::parameters_true(&arm, &mut stream);
+                let clearances = fractions(largest, &mut stream);
+                let joints = test_arms::configuration(&arm, &mut stream);
+                let growth = test_arms::growth(&arm, &mut stream);
+                let settling = Settling { start: Start::Centre, ..Settling::default() };
+                let settled = PhysicalArm::new(&arm, &parameters, &clearances, settling).unwrap().settle(&joints, &growth);
+                assert!(settled.converged);
+                steps = steps.max(settled.steps);
+                steps_all += settled.steps;
+                error_m = error_m.max(settled.settling_error_m);
+                error_rad = error_rad.max(settled.settling_error_rad);
+                // The oracle holds nothing: every load decides.
+                let oracle = TrueArm::new(&arm, &parameters, &clearances, 1e-12).unwrap();
+                let all = oracle.decisions(&static_loads(&oracle, &joints, &growth, &[Play::CENTRE; 8]));
+                let first = static_seats(&oracle, &joints, &growth, &all, 1);
+                let last = seats_about(&oracle, &joints, &growth, &all, &plays(&settled));
+                for (seat, (first, last)) in settled.seats.iter().zip(first.iter().zip(&last)) {
+                    let mut compare = |by, ours: Vector2<f64>, first: Vector2<f64>, last: Vector2<f64>, tilt| match by {
+                        SeatedBy::Fit => assert_eq!(ours, Vector2::zeros()),
+                        SeatedBy::Friction => {
+                            held += 1;
+                            assert!(ours.norm() < 1e-15, "{name}: an undecided coordinate went to {ours}");
+                        }
+                        SeatedBy::Load => {
+                            decided += 1;
+                            let (worst_first, worst_last) =
+                                if tilt { (&mut first_rad, &mut last_rad) } else { (&mut first_m, &mut last_m) };
+                            *worst_first = worst_first.max((ours - first).norm());
+                            *worst_last = worst_last.max((ours - last).norm());
+                        }
+                    };
+                    compare(seat.radial_by, seat.radial_in_joint.into(), first.radial, last.radial, false);
+                    let along = |x| Vector2::new(x, 0.0);
+                    compare(seat.axial_by, along(seat.axial_in_joint), along(first.axial), along(last.axial), false);
+                    compare(seat.tilt_by, seat.tilt_in_joint.into(), first.tilt, last.tilt, true);
+                }
+            }
+            println!(
+                "{name}: against the programme about the middle {first_m:.2e} m, {first_rad:.2e} rad, about the seat {last_m:.2e} m, \
+                 {last_rad:.2e} rad; {decided} decided, {held} held; at most {steps} steps ({} on average), settling error {error_m:.1e} m, \
+                 {error_rad:.1e} rad",
+                steps_all as f64 / 300.0
+            );
+            assert!(first_m < 1e-6 && first_rad < 1e-6, "{name}: {first_m:e} m, {first_rad:e} rad");
+            assert!(last_m < 1e-9 && last_rad < 1e-7, "{name}: {last_m:e} m, {last_rad:e} rad");
+        }
+    }
+
+    #[test]
+    fn no_other_seat_has_less_potential_energy() {
+        let mut stream = stream(3, "test/physics/energy");
+        for configuration in 0..20 {
+            let mut arm = mixed(configuration);
+            arm.gravity_in_base = nalgebra::Vector3::new(stream.uniform(-5.0, 5.0), stream.uniform(-5.0, 5.0), -8.0);
+            let parameters = test_arms::parameters_true(&arm, &mut stream);
+            let clearances = fractions(KINDS[3].1, &mut stream);
+            let joints = test_arms::configuration(&arm, &mut stream);
+            let settling = Settling { start: Start::Centre, ..Settling::default() };
+            let settled = PhysicalArm::new(&arm, &parameters, &clearances, settling).unwrap().settle(&joints, &[1.0; 9]);
+            let segments = arm.chain.at(&parameters).segments();
+            let energy = |plays: &[Play]| {
+                let mut base_from_link = Pose::identity();
+                let mut energy = 0.0;
+                for (joint, q) in joints.iter().enumerate() {
+                    let turn = Pose::rotation(nalgebra::Vector3::z() * *q);
+                    let (before, after) = match arm.chain.joints[joint].kind {
+                        JointKind::Revolute => (Pose::identity(), turn),
+                        JointKind::Prismatic => (Pose::translation(0.0, 0.0, *q), Pose::identity()),
+                    };
+                    base_from_link = base_from_link * segments[joint] * before * plays[joint].pose() * after;
+                    let inertial = arm.links[joint + 1].inertial.as_ref().unwrap();
+                    let centre = base_from_link * inertial.centre_of_mass_in_link;
+                    energy -= inertial.mass_kg * arm.gravity_in_base.dot(&centre.coords);
+                }
+                energy
+            };
+            let rest = plays(&settled);
+            for (play, clearance) in rest.iter().zip(&clearances) {
+                let allowed = 1.0 + 1e-9;
+                assert!(play.radial.norm() <= allowed * clearance.radial_m && play.tilt.norm() <= allowed * clearance.tilt_rad);
+                assert!(play.axial.abs() <= allowed * clearance.axial_m);
+            }
+            let mut disc = |radius: f64, by, at: Vector2<f64>| {
+                let (angle, share) = (stream.uniform(0.0, 6.3), stream.unit());
+                // Half of the samples are anywhere, half on the edge near the seat, where the energy is flattest.
+                let near = nalgebra::Rotation2::new(0.01 * stream.normal()) * at;
+                let anywhere = Vector2::new(angle.cos(), angle.sin()) * radius * share.sqrt();
+                if by != SeatedBy::Load {
+                    at
+                } else if stream.unit() < 0.5 {
+                    near
+                } else {
+                    anywhere
+                }
+            };
+            for _ in 0..2000 {
+                let other: Vec<Play> = settled
+                    .seats
+                    .iter()
+                    .zip(rest.iter().zip(&clearances))
+                    .map(|(seat, (rest, clearance))| Play {
+                        radial: disc(clearance.radial_m, seat.radial_by, rest.radial),
+                        axial: disc(clearance.axial_m, seat.axial_by, Vector2::new(rest.axial, 0.0)).x,
+                        tilt: disc(clearance.tilt_rad, seat.tilt_by, rest.tilt),
+                    })
+                    .collect();
+                // The differences are 1e-7 J and more; 1e-12 J is the rounding of about 60 J.
+                assert!(energy(&other) > energy(&rest) - 1e-12, "{:e} J lower", energy(&rest) - energy(&other));
+            }
+        }
+    }
+
+    #[test]
+    fn the_same_arguments_give_the_same_bits() {
+        let mut stream = stream(4, "test/physics/determinism");
+        let arm = mixed(0);
+        let parameters = test_arms::parameters_true(&arm, &mut stream);
+        let clearances = fractions(KINDS[3].1, &mut stream);
+        let configurations: Vec<Vec<f64>> = (0..20).map(|_| test_arms::configuration(&arm, &mut stream)).collect();
+        for start in [Start::Centre, Start::Predicted] {
+            let fresh = || PhysicalArm::new(&arm, &parameters, &clearances, Settling { start, ..Settling::default() }).unwrap();
+            let settle = |physical: &mut PhysicalArm, joints: &Vec<f64>| bits(&physical.settle(joints, &[1.0; 9]));
+            let alone: Vec<_> = configurations.iter().map(|joints| settle(&mut fresh(), joints)).collect();
+            let mut used = fresh();
+            let in_order: Vec<_> = configurations.iter().map(|joints| settle(&mut used, joints)).collect();
+            let mut backwards: Vec<_> = configurations.iter().rev().map(|joints| settle(&mut used, joints)).collect();
+            backwards.reverse();
+            let threads: Vec<_> = std::thread::scope(|scope| {
+                let spawn = |joints| {
+                    let mut moved = fresh();
+                    scope.spawn(move || settle(&mut moved, joints))
+                };
+                let handles: Vec<_> = configurations.iter().map(spawn).collect();
+                handles.into_iter().map(|handle| handle.join().unwrap()).collect()
+            });
+            assert_eq!(alone, in_order);
+            assert_eq!(alone, backwards);
+            assert_eq!(alone, threads);
+        }
+    }
+
+    #[test]
+    fn the_settling_error_bounds_what_is_left() {
+        let mut stream = stream(5, "test/physics/error");
+        for configuration in 0..40 {
+            let arm = mixed(configuration);
+            let parameters = test_arms::parameters_true(&arm, &mut stream);
+            let clearances = fractions(KINDS[3].1, &mut stream);
+            let joints = test_arms::configuration(&arm, &mut stream);
+            let settle =
+                |settling| PhysicalArm::new(&arm, &parameters, &clearances, settling).unwrap().settle(&joints, &[1.0; 9]);
+            let rest = settle(Settling { tolerance_m: 1e-13, tolerance_rad: 1e-13, ..Settling::default() });
+            assert!(rest.converged);
+            for (start, steps_max) in [(Start::Centre, 2), (Start::Centre, 3), (Start::Predicted, 1), (Start::Predicted, 50)] {
+                let settled = settle(Settling { start, steps_max, ..Settling::default() });
+                let (left_m, left_rad) = distance(&settled.base_from_tool, &rest.base_from_tool);
+                assert!(
+                    left_m <= settled.settling_error_m + 1e-13,
+                    "{start:?}: {left_m:e} m left, {:e}",
+                    settled.settling_error_m
+                );
+                assert!(left_rad <= settled.settling_error_rad + 1e-13, "{start:?}: {left_rad:e} rad left");
+                assert_eq!(settled.converged, steps_max == 50);
+            }
+        }
+    }
+
+    #[test]
+    fn the_largest_clearances_still_settle() {
+        let mut stream = stream(6, "test/physics/largest");
+        let largest = Clearance { radial_m: LARGEST_LENGTH_M, axial_m: LARGEST_LENGTH_M, tilt_rad: LARGEST_TILT_RAD };
+        for configuration in 0..40 {
+            let arm = mixed(configuration);
+            let parameters = test_arms::parameters_true(&arm, &mut stream);
+            let joints = test_arms::configuration(&arm, &mut stream);
+            let settled = |start| {
+                let settling = Settling { start, ..Settling::default() };
+                let settled = PhysicalArm::new(&arm, &parameters, &[largest; 8], settling).unwrap().settle(&joints, &[1.0; 9]);
+                assert!(settled.converged && settled.steps < 20, "{} steps", settled.steps);
+                for seat in settled.seats.iter().filter(|seat| seat.radial_by == SeatedBy::Load) {
+                    let reached = Vector2::from(seat.radial_in_joint).norm() / largest.radial_m;
+                    assert!((reached - 1.0).abs() < 1e-6, "joint {} at {reached} of its clearance", seat.joint);
+                }
+            };
+            settled(Start::Centre);
+            settled(Start::Predicted);
+        }
+    }
+
+    #[test]
+    fn without_gravity_nothing_seats() {
+        let mut arm = test_arms::eight();
+        arm.gravity_in_base.fill(0.0);
+        let clearance = Clearance { radial_m: 30e-6, axial_m: 20e-6, tilt_rad: 100e-6 };
+        let nominal = arm.chain.nominal();
+        let settled =
+            PhysicalArm::new(&arm, &nominal, &[clearance; 8], Settling::default()).unwrap().settle(&[0.5; 8], &[1.0; 9]);
+        assert!(settled.converged);
+        assert!(pose_error(&settled.base_from_tool, &arm.chain.at_nominal().forward(&[0.5; 8])).amax() < 1e-14);
+        assert!(settled.seats.iter().all(|seat| seat.radial_by == SeatedBy::Friction && seat.tilt_by == SeatedBy::Friction));
+    }
+
+    #[test]
+    fn a_vertical_axis_does_not_seat_radially() {
+        // Joint 1 of the test arm is vertical; its parameters are nominal, so that its load is exactly axial and tilting.
+        let arm = test_arms::eight();
+        let clearance = Clearance { radial_m: 30e-6, axial_m: 20e-6, tilt_rad: 100e-6 };
+        let mut clearances = [Clearance::NONE; 8];
+        clearances[0] = clearance;
+        for start in [Start::Centre, Start::Predicted] {
+            let settling = Settling { start, ..Settling::default() };
+            let mut physical = PhysicalArm::new(&arm, &arm.chain.nominal(), &clearances, settling).unwrap();
+            let settled = physical.settle(&[0.3, 0.8, -0.5, 1.0, 0.2, -0.4, 0.1, 0.6], &[1.0; 9]);
+            let seat = settled.seats[0];
+            assert!(settled.converged);
+            assert_eq!((seat.radial_by, seat.axial_by, seat.tilt_by), (SeatedBy::Friction, SeatedBy::Load, SeatedBy::Load));
+            assert!(Vector2::from(seat.radial_in_joint).norm() < 1e-15, "{:?}", seat.radial_in_joint);
+            assert!((seat.axial_in_joint + clearance.axial_m).abs() < 1e-12);
+            assert!(settled.seats[1..].iter().all(|seat| seat.radial_by == SeatedBy::Fit && seat.radial_in_joint == [0.0; 2]));
+        }
+    }
+
+    #[test]
+    fn a_pendulum_hangs_as_computed_by_hand() {
+        // One horizontal axis at the origin, along base y, carrying 2 kg at 0.3 m along it and 0.1 m beside it. The weight presses
+        // the bore down by c; its moment 2 g · 0.3 about base x bends the axis down by γ, to whichever side the mass hangs.
+        let mut arm = test_arms::arm(&[JointKind::Revolute], false);
+        let mut parameters = arm.chain.nominal();
+        parameters.fill(0.0);
+        parameters[0] = -std::f64::consts::FRAC_PI_2;
+        // The tool is 0.3 m out on the axis: d2.
+        parameters[8] = 0.0;
+        parameters[3] = 0.3;
+        let inertial = arm.links[1].inertial.as_mut().unwrap();
+        inertial.mass_kg = 2.0;
+        inertial.centre_of_mass_in_link = nalgebra::Point3::new(0.1, 0.0, 0.3);
+        let (c, gamma) = (40e-6, 150e-6);
+        let clearance = Clearance { radial_m: c, axial_m: 25e-6, tilt_rad: gamma };
+        for q in [0.0, 1.0, -2.0] {
+            let settling = Settling { start: Start::Centre, ..Settling::default() };
+            let settled = PhysicalArm::new(&arm, &parameters, &[clearance], settling).unwrap().settle(&[q], &[1.0; 2]);
+            let seat = settled.seats[0];
+            // The joint's frame has x along base x, y down, z along base y; nothing pushes along the axis.
+            assert_eq!((seat.radial_by, seat.axial_by, seat.tilt_by), (SeatedBy::Load, SeatedBy::Friction, SeatedBy::Load));
+            assert!((Vector2::from(seat.radial_in_joint) - Vector2::new(0.0, c)).norm() < 1e-11, "{:?}", seat.radial_in_joint);
+            assert!((Vector2::from(seat.tilt_in_joint) - Vector2::new(-gamma, 0.0)).norm() < 1e-7, "{:?}", seat.tilt_in_joint);
+            let tool = settled.base_from_tool.translation.vector;
+            let by_hand = nalgebra::Vector3::new(0.0, 0.3 * gamma.cos(), -c - 0.3 * gamma.sin());
+            assert!((tool - by_hand).norm() < 3e-8, "{tool} instead of {by_hand}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_simulated_is_refused() {
+        let arm = test_arms::eight();
+        let nominal = arm.chain.nominal();
+        let new =
+            |arm: &Arm, clearances: &[Clearance], settling| PhysicalArm::new(arm, &nominal, clearances, settling).err().unwrap();
+        let mut bare = arm.clone();
+        bare.links[3].inertial = None;
+        let error = new(&bare, &[Clearance::NONE; 8], Settling::default());
+        assert_eq!(error, PhysicsError::MissingInertial { link: "link3".to_owned() });
+        let error = new(&arm, &[Clearance::NONE; 7], Settling::default());
+        assert_eq!(error.to_string(), "7 clearances, expected 8");
+        let error = new(&arm, &[Clearance { radial_m: -1e-6, ..Clearance::NONE }; 8], Settling::default());
+        assert_eq!(error.to_string(), "radial clearance of joint 0 is -0.000001, allowed is 0 to 0.001 (m)");
+        let error = new(&arm, &[Clearance::NONE; 8], Settling { tolerance_m: f64::NAN, ..Settling::default() });
+        assert!(matches!(error, PhysicsError::BadSetting { what: "tolerance_m", .. }));
+        let mut heavy = arm.clone();
+        heavy.links[8].inertial.as_mut().unwrap().inertia_in_link[(0, 0)] = -1.0;
+        assert!(matches!(new(&heavy, &[Clearance::NONE; 8], Settling::default()), PhysicsError::BadInertial { .. }));
+    }
+
+    fn plays(settled: &Settled) -> Vec<Play> {
+        let play = |seat: &Seat| Play {
+            radial: seat.radial_in_joint.into(),
+            axial: seat.axial_in_joint,
+            tilt: seat.tilt_in_joint.into(),
+        };
+        settled.seats.iter().map(play).collect()
+    }
+
+    /// Every number of the result, and the rest as text.
+    fn bits(settled: &Settled) -> (Vec<u64>, String) {
+        let mut numbers = vec![settled.settling_error_m, settled.settling_error_rad];
+        for pose in std::iter::once(&settled.base_from_tool).chain(&settled.base_from_link) {
+            numbers.extend(pose.translation.vector.iter().chain(pose.rotation.coords.iter()));
+        }
+        for seat in &settled.seats {
+            numbers.extend(seat.radial_in_joint.iter().chain(&seat.tilt_in_joint).chain([&seat.axial_in_joint]));
+        }
+        (numbers.iter().map(|number| number.to_bits()).collect(), format!("{settled:?}"))
     }
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::{Translation3, Vector2, Vector3};
 
+use super::clearance::SeatedBy;
 use crate::frames::{Pose, rotation_from_vector};
 
 /// The coordinates of one joint's play, in the joint frame.
@@ -37,4 +38,12 @@ pub(super) struct Load {
     pub(super) axial: f64,
     /// N·m.
     pub(super) tilt: Vector2<f64>,
+}
+
+/// What decides where the coordinates of one joint's play come to rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Decision {
+    pub(super) radial: SeatedBy,
+    pub(super) axial: SeatedBy,
+    pub(super) tilt: SeatedBy,
 }

@@ -7,9 +7,9 @@ use crate::frames::Pose;
 /// Where the joints lie in their clearances when the simulation starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
-    /// In the middle of every clearance.
+    /// In the middle of every clearance: rapier finds the seat unaided.
     Centre,
-    /// Where rigid statics predicts them to rest.
+    /// Where rigid statics predicts them to rest: a quarter to a half faster.
     Predicted,
 }
 
@@ -24,35 +24,25 @@ pub struct Settling {
     pub tolerance_rad: f64,
     /// After so many steps the pose is taken as it is.
     pub steps_max: usize,
-    /// Duration of a step, s.
-    pub time_step_s: f64,
-    /// A radial or axial coordinate moves if its load is at least this fraction of the weight outboard of the joint, a tilt if
-    /// its moment is at least this fraction of that weight times the length of the segments outboard of the joint: the friction
-    /// of the fit.
+    /// The friction of the fits. A radial or axial coordinate moves if its load is at least this fraction of the weight outboard
+    /// of the joint; a tilt, if its moment is at least this fraction of that weight times the length of the segments outboard.
+    ///
+    /// It also keeps out seats that are not well defined: when the joints inboard tilt by `δ` in all, a load of this fraction
+    /// turns by up to `δ / holding_ratio`, and the seat with it. At 0.05 the linear programme about the middle of the clearances
+    /// is off by at most 1 µm and 1.2 µrad if all clearances are 60 µm and 200 µrad (at 0.02, by 2 µm and 3 µrad).
     pub holding_ratio: f64,
 }
 
 impl Default for Settling {
     fn default() -> Self {
-        Settling {
-            start: Start::Predicted,
-            tolerance_m: 1e-9,
-            tolerance_rad: 1e-9,
-            steps_max: 50,
-            time_step_s: 1.0,
-            holding_ratio: 0.02,
-        }
+        Settling { start: Start::Centre, tolerance_m: 1e-9, tolerance_rad: 1e-9, steps_max: 50, holding_ratio: 0.05 }
     }
 }
 
 impl Settling {
     pub(super) fn check(&self) -> Result<(), PhysicsError> {
-        let positive = [
-            ("tolerance_m", self.tolerance_m),
-            ("tolerance_rad", self.tolerance_rad),
-            ("time_step_s", self.time_step_s),
-            ("holding_ratio", self.holding_ratio),
-        ];
+        let positive =
+            [("tolerance_m", self.tolerance_m), ("tolerance_rad", self.tolerance_rad), ("holding_ratio", self.holding_ratio)];
         for (what, got) in positive {
             if !(got > 0.0 && got.is_finite()) {
                 return Err(PhysicsError::BadSetting { what, got, expected: "a positive number" });
@@ -72,13 +62,14 @@ pub struct Settled {
     pub base_from_tool: Pose,
     /// Pose of every link, base first.
     pub base_from_link: Vec<Pose>,
-    /// How far the tool's origin may still be from rest, m.
+    /// How far the tool's origin may still be from rest, m: the way it went in the last step. What is left after a step is about a
+    /// twentieth of what was left before, so this is a bound with some room.
     pub settling_error_m: f64,
     /// The same for its attitude, rad.
     pub settling_error_rad: f64,
     /// Simulated steps; none if no joint has clearance.
     pub steps: usize,
-    /// Simulated time, s.
+    /// Simulated time, s. Long, as damping is chosen to outweigh inertia: how a pose is reached is not modelled.
     pub simulated_time_s: f64,
     /// Whether the tolerances of [`Settling`] were met.
     pub converged: bool,

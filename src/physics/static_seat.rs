@@ -7,35 +7,36 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use super::clearance::SeatedBy;
-use super::play::{Load, Play};
+use super::clearance::{Clearance, SeatedBy};
+use super::play::{Decision, Load, Play};
 use super::true_arm::TrueArm;
 use crate::frames::Pose;
 
-/// The solution of the linear programme made `rounds` times: 1 for the one about the middle of the clearances.
-pub(super) fn static_seats(arm: &TrueArm, joints: &[f64], growth: &[f64], rounds: usize) -> Vec<Play> {
+/// The solution of the linear programme, made `rounds` times: 1 for the one about the middle of the clearances. Coordinates that
+/// `decisions` does not leave to the load stay in the middle.
+pub(super) fn static_seats(arm: &TrueArm, joints: &[f64], growth: &[f64], decisions: &[Decision], rounds: usize) -> Vec<Play> {
     let mut plays = vec![Play::CENTRE; arm.joint_count()];
     for _ in 0..rounds {
-        plays = seats_about(arm, joints, growth, &plays);
+        plays = seats_about(arm, joints, growth, decisions, &plays);
     }
     plays
 }
 
-fn seats_about(arm: &TrueArm, joints: &[f64], growth: &[f64], plays: &[Play]) -> Vec<Play> {
-    static_loads(arm, joints, growth, plays).iter().enumerate().map(|(joint, load)| seat(arm, joint, load)).collect()
+/// The solution of the linear programme about `plays`.
+pub(super) fn seats_about(arm: &TrueArm, joints: &[f64], growth: &[f64], decisions: &[Decision], plays: &[Play]) -> Vec<Play> {
+    let loads = static_loads(arm, joints, growth, plays);
+    loads.iter().zip(&arm.clearances).zip(decisions).map(|((load, clearance), by)| seat(clearance, by, load)).collect()
 }
 
-fn seat(arm: &TrueArm, joint: usize, load: &Load) -> Play {
-    let clearance = &arm.clearances[joint];
-    let [radial_by, axial_by, tilt_by] = arm.seated_by(joint, load.radial.norm(), load.axial, load.tilt.norm());
+fn seat(clearance: &Clearance, by: &Decision, load: &Load) -> Play {
     let along = |radius: f64, load: &Vector2<f64>, by| match by {
         SeatedBy::Load => load * (radius / load.norm()),
         SeatedBy::Fit | SeatedBy::Friction => Vector2::zeros(),
     };
     Play {
-        radial: along(clearance.radial_m, &load.radial, radial_by),
-        axial: if axial_by == SeatedBy::Load { clearance.axial_m * load.axial.signum() } else { 0.0 },
-        tilt: along(clearance.tilt_rad, &load.tilt, tilt_by),
+        radial: along(clearance.radial_m, &load.radial, by.radial),
+        axial: if by.axial == SeatedBy::Load { clearance.axial_m * load.axial.signum() } else { 0.0 },
+        tilt: along(clearance.tilt_rad, &load.tilt, by.tilt),
     }
 }
 

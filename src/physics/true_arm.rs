@@ -4,6 +4,7 @@ use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 use super::clearance::{Clearance, SeatedBy};
 use super::error::PhysicsError;
+use super::play::{Decision, Load};
 use crate::arm::{Arm, Inertial};
 use crate::frames::Pose;
 use crate::kinematics::JointKind;
@@ -104,23 +105,25 @@ impl TrueArm {
         }
     }
 
-    /// What seats the radial, axial and tilt coordinate of `joint` under these loads (N, N, N·m).
-    pub(super) fn seated_by(&self, joint: usize, radial: f64, axial: f64, tilt: f64) -> [SeatedBy; 3] {
-        let (clearance, holding) = (&self.clearances[joint], &self.holding[joint]);
+    /// What decides the coordinates of each joint's play under the loads `loads`.
+    pub(super) fn decisions(&self, loads: &[Load]) -> Vec<Decision> {
         let by = |clearance: f64, load: f64, holding: f64| {
             if clearance == 0.0 {
                 SeatedBy::Fit
-            } else if load.abs() >= holding {
+            } else if load >= holding {
                 SeatedBy::Load
             } else {
                 SeatedBy::Friction
             }
         };
-        [
-            by(clearance.radial_m, radial, holding.force),
-            by(clearance.axial_m, axial, holding.force),
-            by(clearance.tilt_rad, tilt, holding.moment),
-        ]
+        let joints = self.clearances.iter().zip(&self.holding).zip(loads);
+        joints
+            .map(|((clearance, holding), load)| Decision {
+                radial: by(clearance.radial_m, load.radial.norm(), holding.force),
+                axial: by(clearance.axial_m, load.axial.abs(), holding.force),
+                tilt: by(clearance.tilt_rad, load.tilt.norm(), holding.moment),
+            })
+            .collect()
     }
 }
 

@@ -12,18 +12,23 @@
 use nalgebra::{Vector2, Vector3};
 use rapier3d::dynamics::{
     GenericJoint, IntegrationParameters, JointAxesMask, JointAxis, MassProperties, Multibody, MultibodyIndex, MultibodyJoint,
-    RigidBodyBuilder, RigidBodyHandle, SpringCoefficients,
+    MultibodyLink, RigidBodyBuilder, RigidBodyHandle, SpringCoefficients,
 };
 use rapier3d::pipeline::PhysicsWorld;
 
+use super::clearance::SeatedBy;
 use super::convert::{matrix_to_rapier, pose_from_rapier, pose_to_rapier, vector_to_rapier};
-use super::play::{Load, Play};
+use super::play::{Decision, Load, Play};
 use super::true_arm::{TrueArm, turn_about_z};
 use crate::frames::Pose;
 
-/// A step overshoots the edge of the clearance by a quarter of it, so that the limit, which rapier notices only once it is
-/// passed, takes hold in the next step. An error along the circle shrinks to a quarter of itself per step, with the sign changed.
-const REACH_PER_STEP: f64 = 1.25;
+/// A step carries a coordinate this far beyond the edge of its clearance, from the middle: rapier notices a limit once it is
+/// passed. What exceeds 1 is also the factor by which an error along the circle shrinks per step (its sign changes).
+const REACH_PER_STEP: f64 = 1.05;
+
+/// Duration of a step, s. Long, so that damping outweighs inertia by four orders of magnitude: steps are quasi-static, the
+/// coordinates hardly push each other, and a few sweeps of rapier's solver are exact.
+pub(super) const TIME_STEP_S: f64 = 1.0;
 
 /// Stiffness of the limits: the angle that their spring would turn in one step, rad. A limit holds a coordinate at the edge
 /// times `1 + REACH_PER_STEP / STIFFNESS²`, and each step leaves `2 / STIFFNESS` of what was beyond it.
@@ -32,13 +37,19 @@ const STIFFNESS: f64 = 1e5;
 /// Damping of a coordinate that its load does not move, relative to one at the threshold.
 const HELD: f64 = 1e12;
 
-/// The rapier links of one joint of the arm, by index in the multibody.
+/// The rapier links of one joint of the arm, by index in the multibody, and its free coordinates, by index in rapier's
+/// generalised coordinates.
 #[derive(Clone, Copy, Debug)]
 struct JointLinks {
     slide: Option<usize>,
-    tilt: Option<[usize; 2]>,
+    lean: Option<[usize; 2]>,
     /// The link that carries the mass.
     body: usize,
+    /// Two coordinates from here on.
+    radial: Option<usize>,
+    axial: Option<usize>,
+    /// Two coordinates from here on.
+    tilt: Option<usize>,
 }
 
 /// The multibody, its joints' frames as last placed, and rapier around it.
@@ -53,33 +64,39 @@ pub(super) struct World {
 }
 
 impl World {
-    pub(super) fn new(arm: &TrueArm, time_step_s: f64) -> Self {
+    pub(super) fn new(arm: &TrueArm) -> Self {
         let mut rapier = PhysicsWorld { gravity: vector_to_rapier(&arm.gravity_in_base), ..PhysicsWorld::default() };
         rapier.integration_parameters = IntegrationParameters {
-            dt: time_step_s,
-            min_ccd_dt: time_step_s,
+            dt: TIME_STEP_S,
+            min_ccd_dt: TIME_STEP_S,
             num_solver_iterations: 1,
             num_internal_pgs_iterations: 4,
             ..IntegrationParameters::default()
         };
         let softness =
             SpringCoefficients { natural_frequency: STIFFNESS / (std::f64::consts::TAU * time_step_s), damping_ratio: 1.0 };
+            SpringCoefficients { natural_frequency: STIFFNESS / (std::f64::consts::TAU * TIME_STEP_S), damping_ratio: 1.0 };
         let root = rapier.bodies.insert(RigidBodyBuilder::fixed());
-        let mut builder = Builder { rapier, last: root, count: 0, softness };
+        let mut builder = Builder { rapier, last: root, count: 0, freedoms: 0, softness };
         let mut links = Vec::new();
         for (clearance, inertial) in arm.clearances.iter().zip(&arm.inertials) {
+            let no_mass = MassProperties::default();
             let mass = MassProperties::with_inertia_matrix(
                 vector_to_rapier(&inertial.centre_of_mass_in_link.coords),
                 inertial.mass_kg,
                 matrix_to_rapier(&inertial.inertia_in_link),
             );
+            let leans = clearance.tilt_rad > 0.0;
             let mut free = JointAxesMask::empty();
             let mut limits = Vec::new();
+            let (mut radial, mut axial, mut tilt) = (None, None, None);
             if clearance.radial_m > 0.0 {
+                radial = Some(builder.freedoms);
                 free |= JointAxesMask::LIN_X | JointAxesMask::LIN_Y;
                 limits.push((JointAxis::LinX, clearance.radial_m));
             }
             if clearance.axial_m > 0.0 {
+                axial = Some(builder.freedoms + if radial.is_some() { 2 } else { 0 });
                 free |= JointAxesMask::LIN_Z;
                 limits.push((JointAxis::LinZ, clearance.axial_m));
             }
@@ -89,21 +106,25 @@ impl World {
             let tilt = tilts.then(|| {
                 let limit = [(JointAxis::AngX, clearance.tilt_rad)];
                 let first = builder.link(JointAxesMask::ANG_X, &limit, no_mass);
+            let slide = (!free.is_empty()).then(|| builder.link(free, &limits, if leans { no_mass } else { mass }));
+            let lean = leans.then(|| {
+                tilt = Some(builder.freedoms);
+                let first = builder.link(JointAxesMask::ANG_X, &[(JointAxis::AngX, clearance.tilt_rad)], no_mass);
                 [first, builder.link(JointAxesMask::ANG_Y, &[], mass)]
             });
-            let body = match (slide, tilt) {
+            let body = match (slide, lean) {
                 (_, Some([_, second])) => second,
                 (Some(slide), None) => slide,
                 (None, None) => builder.link(JointAxesMask::empty(), &[], mass),
             };
-            links.push(JointLinks { slide, tilt, body });
+            links.push(JointLinks { slide, lean, body, radial, axial, tilt });
         }
         let tool = builder.link(JointAxesMask::empty(), &[], MassProperties::default());
         let Builder { mut rapier, last, .. } = builder;
         // A step of no duration: rapier takes notice of bodies, masses and joints.
         rapier.integration_parameters.dt = 0.0;
         rapier.step();
-        rapier.integration_parameters.dt = time_step_s;
+        rapier.integration_parameters.dt = TIME_STEP_S;
         let multibody = rapier.multibody_joints.rigid_body_link(last).expect("the tool is a link of the multibody").multibody;
         let weights = arm.inertials.iter().map(|inertial| arm.gravity_in_base * inertial.mass_kg).collect();
         let directions = vec![[0.0; 2]; links.len()];
@@ -118,6 +139,10 @@ impl World {
         self.rapier.multibody_joints.get_multibody_mut_internal(self.multibody).expect("the multibody is never removed")
     }
 
+    fn link(&self, link: usize) -> &MultibodyLink {
+        self.multibody().link(link).expect("links are never removed")
+    }
+
     /// Number of free coordinates.
     pub(super) fn freedoms(&self) -> usize {
         self.multibody().ndofs()
@@ -127,7 +152,7 @@ impl World {
     /// `plays`, everything at rest.
     pub(super) fn place(&mut self, arm: &TrueArm, joints: &[f64], growth: &[f64], plays: &[Play]) {
         for (joint, q) in joints.iter().enumerate() {
-            let JointLinks { slide, tilt, body } = self.links[joint];
+            let JointLinks { slide, lean, body, radial: radial_coordinate, axial: axial_coordinate, .. } = self.links[joint];
             let play = plays[joint];
             let (inboard, outboard) = arm.motions(joint, *q);
             let mut reached = arm.grown_segment(joint, growth) * inboard;
@@ -135,21 +160,21 @@ impl World {
             let [radial, leaning] = self.directions[joint].map(turn_about_z);
             if let Some(slide) = slide {
                 let mut coordinates = Vec::with_capacity(3);
-                if arm.clearances[joint].radial_m > 0.0 {
+                if radial_coordinate.is_some() {
                     coordinates.extend([play.radial.norm(), 0.0]);
                 }
-                if arm.clearances[joint].axial_m > 0.0 {
+                if axial_coordinate.is_some() {
                     coordinates.push(play.axial);
                 }
                 let after = if body == slide { radial.inverse() * outboard } else { radial.inverse() };
                 self.set_link(slide, &(reached * radial), &after, &coordinates);
                 reached = Pose::identity();
             }
-            if let Some([first, second]) = tilt {
+            if let Some([first, second]) = lean {
                 self.set_link(first, &(reached * leaning), &Pose::identity(), &[play.tilt.norm()]);
                 self.set_link(second, &Pose::identity(), &(leaning.inverse() * outboard), &[0.0]);
             }
-            if slide.is_none() && tilt.is_none() {
+            if slide.is_none() && lean.is_none() {
                 self.set_link(body, &reached, &outboard, &[]);
             }
         }
@@ -174,9 +199,8 @@ impl World {
     }
 
     /// Where the joints lie in their clearances, read from rapier's coordinates.
-    pub(super) fn plays(&self, arm: &TrueArm) -> Vec<Play> {
-        let multibody = self.multibody();
-        let coordinates = |link: usize| multibody.link(link).expect("links are never removed").joint.coords();
+    pub(super) fn plays(&self) -> Vec<Play> {
+        let coordinates = |link: usize| self.link(link).joint.coords();
         let mut plays = Vec::with_capacity(self.links.len());
         for (joint, links) in self.links.iter().enumerate() {
             let [radial, leaning] = self.directions[joint];
@@ -186,17 +210,16 @@ impl World {
                 play.radial = turned(radial, coordinates[0], coordinates[1]);
                 play.axial = coordinates[2];
             }
-            if let Some([first, second]) = links.tilt {
+            if let Some([first, second]) = links.lean {
                 play.tilt = turned(leaning, coordinates(first)[3], coordinates(second)[4]);
             }
             plays.push(play);
         }
-        debug_assert_eq!(plays.len(), arm.joint_count());
         plays
     }
 
     /// The loads on the joints' plays: gravity through rapier's Jacobians of the links, as last placed.
-    pub(super) fn loads(&self, arm: &TrueArm) -> Vec<Load> {
+    pub(super) fn loads(&self) -> Vec<Load> {
         let multibody = self.multibody();
         let mut loads = vec![0.0; multibody.ndofs()];
         for (outer, weight) in self.weights.iter().enumerate() {
@@ -205,60 +228,39 @@ impl World {
                 *load += column[0] * weight.x + column[1] * weight.y + column[2] * weight.z;
             }
         }
-        let first_coordinate = |link: usize| multibody.link(link).expect("links are never removed").assembly_id();
-        (0..self.links.len())
-            .map(|joint| {
-                let [radial, leaning] = self.directions[joint];
-                let mut load = Load { radial: Vector2::zeros(), axial: 0.0, tilt: Vector2::zeros() };
-                if let Some(slide) = self.links[joint].slide {
-                    let mut next = first_coordinate(slide);
-                    if arm.clearances[joint].radial_m > 0.0 {
-                        load.radial = turned(radial, loads[next], loads[next + 1]);
-                        next += 2;
-                    }
-                    if arm.clearances[joint].axial_m > 0.0 {
-                        load.axial = loads[next];
-                    }
-                }
-                if let Some([first, second]) = self.links[joint].tilt {
-                    load.tilt = turned(leaning, loads[first_coordinate(first)], loads[first_coordinate(second)]);
-                }
-                load
-            })
-            .collect()
+        let of_joint = |(links, [radial, leaning]): (&JointLinks, &[f64; 2])| Load {
+            radial: links.radial.map_or_else(Vector2::zeros, |first| turned(*radial, loads[first], loads[first + 1])),
+            axial: links.axial.map_or(0.0, |coordinate| loads[coordinate]),
+            tilt: links.tilt.map_or_else(Vector2::zeros, |first| turned(*leaning, loads[first], loads[first + 1])),
+        };
+        self.links.iter().zip(&self.directions).map(of_joint).collect()
     }
 
-    /// Damping under which a step carries each coordinate just across its clearance, and those that friction holds nowhere.
-    /// It sets how fast the arm comes to rest, never where.
-    pub(super) fn damp(&mut self, arm: &TrueArm, loads: &[Load]) {
-        let time_step = self.rapier.integration_parameters.dt;
-        let damping_of = |clearance: f64, load: f64, holding: f64| {
-            let damping = time_step * load.max(holding) / (REACH_PER_STEP * clearance);
-            if load < holding { HELD * damping } else { damping }
+    /// Sets the damping: a step carries each coordinate that its load decides just across its clearance, and those that friction
+    /// holds nowhere. Damping sets how fast the arm comes to rest, never where.
+    pub(super) fn damp(&mut self, arm: &TrueArm, loads: &[Load], decisions: &[Decision]) {
+        let damping_of = |clearance: f64, load: f64, holding: f64, by| {
+            let across = |load: f64| TIME_STEP_S * load / (REACH_PER_STEP * clearance);
+            // The load of a decided coordinate was above the threshold in the middle, and hardly changes.
+            if by == SeatedBy::Load { across(load.max(0.5 * holding)) } else { HELD * across(holding) }
         };
         for (joint, load) in loads.iter().enumerate() {
-            let (clearance, holding) = (arm.clearances[joint], arm.holding[joint]);
+            let (clearance, holding, by) = (arm.clearances[joint], arm.holding[joint], decisions[joint]);
             let links = self.links[joint];
             let multibody = self.multibody_mut();
-            let first_coordinate = |link: usize| multibody.link(link).expect("links are never removed").assembly_id();
-            let mut set = Vec::with_capacity(5);
-            if let Some(slide) = links.slide {
-                let mut next = first_coordinate(slide);
-                if clearance.radial_m > 0.0 {
-                    let damping = damping_of(clearance.radial_m, load.radial.norm(), holding.force);
-                    set.extend([(next, damping), (next + 1, damping)]);
-                    next += 2;
-                }
-                if clearance.axial_m > 0.0 {
-                    set.push((next, damping_of(clearance.axial_m, load.axial.abs(), holding.force)));
-                }
+            let mut set = |coordinate: usize, damping: f64| multibody.damping_mut()[coordinate] = damping;
+            if let Some(radial) = links.radial {
+                let damping = damping_of(clearance.radial_m, load.radial.norm(), holding.force, by.radial);
+                set(radial, damping);
+                set(radial + 1, damping);
+            }
+            if let Some(axial) = links.axial {
+                set(axial, damping_of(clearance.axial_m, load.axial.abs(), holding.force, by.axial));
             }
             if let Some(tilt) = links.tilt {
-                let damping = damping_of(clearance.tilt_rad, load.tilt.norm(), holding.moment);
-                set.extend(tilt.map(|link| (first_coordinate(link), damping)));
-            }
-            for (coordinate, damping) in set {
-                multibody.damping_mut()[coordinate] = damping;
+                let damping = damping_of(clearance.tilt_rad, load.tilt.norm(), holding.moment, by.tilt);
+                set(tilt, damping);
+                set(tilt + 1, damping);
             }
         }
     }
@@ -279,7 +281,7 @@ impl World {
     }
 
     fn base_from(&self, link: usize) -> Pose {
-        pose_from_rapier(self.multibody().link(link).expect("links are never removed").local_to_world())
+        pose_from_rapier(self.link(link).local_to_world())
     }
 }
 
@@ -292,6 +294,7 @@ struct Builder {
     rapier: PhysicsWorld,
     last: RigidBodyHandle,
     count: usize,
+    freedoms: usize,
     softness: SpringCoefficients<f64>,
 }
 
@@ -308,6 +311,7 @@ impl Builder {
         self.rapier.multibody_joints.insert(self.last, body, joint, true).expect("a chain has no loop");
         self.last = body;
         self.count += 1;
+        self.freedoms += free.bits().count_ones() as usize;
         self.count
     }
 }
