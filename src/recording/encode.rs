@@ -39,14 +39,14 @@ pub struct Message {
 #[derive(Debug, thiserror::Error)]
 pub enum EncodeError {
     /// JSON could not hold the event: a number is NaN or infinite.
-    #[error("{topic}: cannot be recorded and read back, a number is not finite ({reason}, after {context:?})")]
+    #[error("{topic}: {field} is NaN or infinite and cannot be recorded ({reason})")]
     NotFinite {
         /// Name of the topic.
         topic: &'static str,
+        /// The innermost named field.
+        field: String,
         /// What the JSON reader says.
         reason: String,
-        /// The JSON text just before.
-        context: String,
     },
     /// A configuration of another arm.
     #[error("{topic}: a configuration has {got} joint coordinates, the arm has {expected} joints")]
@@ -332,19 +332,20 @@ impl Messages {
     }
 
     fn json<T: Serialize + DeserializeOwned + PartialEq>(&mut self, topic: Topic, value: &T) -> Result<(), EncodeError> {
-        let not_finite = |reason: String, context: String| EncodeError::NotFinite { topic: topic.name(), reason, context };
-        let data = serde_json::to_vec(value).map_err(|error| not_finite(error.to_string(), String::new()))?;
+        let not_finite =
+            |field: &str, reason: String| EncodeError::NotFinite { topic: topic.name(), field: field.to_owned(), reason };
+        let data = serde_json::to_vec(value).map_err(|error| not_finite("a number", error.to_string()))?;
         // serde_json writes what is not finite as null without a word: reading back is the only check that sees all fields.
         match serde_json::from_slice::<T>(&data) {
             Ok(restored) if restored == *value => {
                 self.push(topic, data);
                 Ok(())
             }
-            Ok(_) => Err(not_finite("an optional number".to_owned(), String::new())),
+            Ok(_) => Err(not_finite("a number", "an optional one".to_owned())),
             Err(error) => {
                 let text = String::from_utf8_lossy(&data[..error.column().min(data.len())]);
-                let context: Vec<char> = text.chars().rev().take(60).collect();
-                Err(not_finite(error.to_string(), context.into_iter().rev().collect()))
+                let field = text.rsplit("\":").nth(1).and_then(|before| before.rsplit('"').next()).unwrap_or("a number");
+                Err(not_finite(field, error.to_string()))
             }
         }
     }

@@ -290,6 +290,12 @@ impl Messages {
         })
     }
 
+    /// Bytes of the file that have been read and understood so far.
+    #[must_use]
+    pub fn offset(&self) -> u64 {
+        self.offset
+    }
+
     fn foreign(&self) -> ReadError {
         let topics: BTreeSet<&Arc<RecordedChannel>> = self.catalogue.channels.values().collect();
         let mut names: Vec<String> = topics
