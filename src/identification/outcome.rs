@@ -26,8 +26,10 @@ pub struct Identification {
     /// Errors of the identified model on the fitted configurations.
     pub fitted: Errors,
     /// Errors of the identified model on held-out configurations; absent where there are none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held_out: Option<Errors>,
     /// Errors of the nominal model on held-out configurations.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held_out_nominal: Option<Errors>,
     /// Residuals of every configuration, in the order of measuring.
     pub residuals: Vec<Residual>,
@@ -45,6 +47,7 @@ pub struct ParameterEstimate {
     /// Identified value, SI; the nominal one where the parameter was dropped.
     pub identified: f64,
     /// Standard error, SI; of the combination it stands for ([`Combination`]); absent where it was dropped.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub standard_error: Option<f64>,
     /// `m` or `rad`.
     pub unit: String,
@@ -77,6 +80,7 @@ pub struct Errors {
     /// Distance between measured and predicted origin, m.
     pub position_m: Summary,
     /// Angle between measured and predicted attitude, rad; absent where no attitude was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation_rad: Option<Summary>,
 }
 

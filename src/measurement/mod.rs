@@ -35,7 +35,7 @@ pub struct Measurement {
     /// Measured origin of the tool frame, m.
     pub position_m: [f64; 3],
     /// Measured attitude of the tool frame as quaternion x, y, z, w; absent where the sensor sees positions only.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub attitude_xyzw: Option<[f64; 4]>,
 }
 

@@ -1,0 +1,623 @@
+//! Tests of the recording as a whole.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
+use serde_json::Value;
+
+use super::encode::Encoder;
+use super::topic::Topic;
+use super::*;
+use crate::arm::{Arm, Fixture, Geometry, Link, Shape};
+use crate::design::outcome::{DesignOutcome, EvennessDomains, RandomReference, StopReason, SwarmIteration};
+use crate::frames::Pose;
+use crate::identification::outcome::{Combination, Errors, Identification, ParameterEstimate, Residual, Summary};
+use crate::kinematics::chain::{Joint, JointKind};
+use crate::kinematics::mdh;
+use crate::measurement::{Measurement, Role};
+use crate::quality::Indexes;
+use crate::seed::{Stream, stream};
+
+const JOINTS: usize = 6;
+
+/// Sizes of a synthetic run.
+struct Size {
+    iterations: usize,
+    particles: usize,
+    configurations: usize,
+    measurements: usize,
+}
+
+const SMALL: Size = Size { iterations: 23, particles: 7, configurations: 5, measurements: 20 };
+
+fn arm() -> Arm {
+    let mut stream = stream(7, "test/recording/arm");
+    let frames: Vec<mdh::Frame> = (0..=JOINTS)
+        .map(|_| mdh::Frame {
+            alpha: stream.uniform(-1.6, 1.6),
+            a: stream.uniform(0.0, 0.4),
+            theta: stream.uniform(-1.0, 1.0),
+            d: stream.uniform(0.0, 0.3),
+            beta: 0.0,
+        })
+        .collect();
+    let joints = (1..=JOINTS)
+        .map(|joint| Joint { name: format!("joint{joint}"), kind: JointKind::Revolute, lower: -3.0, upper: 3.0 })
+        .collect();
+    let shape = |geometry| Shape { link_from_shape: Pose::translation(0.1, 0.0, 0.05), geometry };
+    let link = |name: String, geometry| Link { name, inertial: None, shapes: vec![shape(geometry)] };
+    let mut links = vec![link("base_link".to_owned(), Geometry::Cylinder { half_length: 0.1, radius: 0.08 })];
+    links.extend((1..=JOINTS).map(|number| {
+        let capsule = Geometry::Capsule { half_length: 0.12, radius: 0.04 };
+        link(format!("link{number}"), if number == JOINTS { Geometry::Sphere { radius: 0.05 } } else { capsule })
+    }));
+    let floor =
+        Fixture { name: "floor".to_owned(), shape: shape(Geometry::Box { half_extents: [1.0, 1.0, 0.01] }), may_touch: vec![0] };
+    Arm {
+        name: "synthetic".to_owned(),
+        chain: mdh::chain(&frames, joints, None, None),
+        links,
+        fixtures: vec![floor],
+        uncollidable: Vec::new(),
+        gravity_in_base: Vector3::new(0.0, 0.0, -9.81),
+    }
+}
+
+fn indexes(stream: &mut Stream) -> Indexes {
+    Indexes {
+        o1: stream.uniform(0.0, 1.0),
+        o2: stream.uniform(0.0, 1e-3),
+        o3: stream.uniform(0.0, 1e-9),
+        o4: stream.uniform(0.0, 1e-200),
+        o5: stream.uniform(0.0, 1e9),
+        o6: -0.0,
+        dispersion_m2: f64::MIN_POSITIVE / 3.0,
+        evenness: 0.1 + 0.2,
+        comprehensive: stream.uniform(0.0, 1.0),
+        rank: 27,
+    }
+}
+
+fn configurations(stream: &mut Stream, count: usize) -> Vec<Vec<f64>> {
+    (0..count).map(|_| (0..JOINTS).map(|_| stream.uniform(-3.0, 3.0)).collect()).collect()
+}
+
+/// A run as a `kincal run` makes it, with numbers that look like those of one.
+fn events(size: &Size) -> Vec<Event> {
+    let mut stream = stream(11, "test/recording/events");
+    let chain = arm().chain.at_nominal();
+    let mut events = vec![
+        Event::Start(Start {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            command: "run".to_owned(),
+            scene: "name = \"synthetic\"\nseed = 11 # ünïcode, \"quotes\"\n".to_owned(),
+        }),
+        Event::Note("a note".to_owned()),
+    ];
+    for iteration in 0..=size.iterations {
+        let end_points = (0..size.particles)
+            .map(|_| {
+                let set = configurations(&mut stream, size.configurations);
+                set.iter().map(|joints| chain.forward(joints).translation.vector.cast::<f32>().into()).collect()
+            })
+            .collect();
+        events.push(Event::Swarm(SwarmIteration {
+            iteration,
+            iterations: size.iterations,
+            fitness: (0..size.particles).map(|_| stream.uniform(0.0, 2.0)).collect(),
+            personal_best: (0..size.particles).map(|_| stream.uniform(0.0, 2.0)).collect(),
+            best_particle: iteration % size.particles,
+            best: indexes(&mut stream),
+            inertia: if iteration == 0 { 0.0 } else { stream.uniform(0.4, 0.9) },
+            c1: stream.uniform(0.0, 2.0),
+            c2: stream.uniform(0.0, 2.0),
+            evaluations: (iteration * size.particles) as u64,
+            rejections: u64::MAX - iteration as u64,
+            end_points,
+            best_configurations: if iteration % 3 == 0 { configurations(&mut stream, size.configurations) } else { Vec::new() },
+        }));
+    }
+    events.push(Event::Designed(DesignOutcome {
+        method: "pso".to_owned(),
+        configurations: configurations(&mut stream, size.configurations),
+        indexes: indexes(&mut stream),
+        indexes_all_parameters: indexes(&mut stream),
+        evenness_domains: EvennessDomains { reachable: stream.uniform(0.0, 1.0), bounding_cube: stream.uniform(0.0, 1.0) },
+        random: RandomReference { sets: 100, mean: indexes(&mut stream), min: indexes(&mut stream), max: indexes(&mut stream) },
+        dropped_parameters: vec!["alpha1".to_owned(), "d2".to_owned()],
+        evaluations: 1234,
+        rejections: 56,
+        stop: StopReason::IterationLimit,
+    }));
+    for (index, joints) in configurations(&mut stream, size.measurements).into_iter().enumerate() {
+        let pose = chain.forward(&joints);
+        events.push(Event::Measured(Measurement {
+            index,
+            pose_id: index,
+            role: if index % 4 == 3 { Role::HeldOut } else { Role::Fit },
+            time_s: 12.5 * index as f64,
+            joints,
+            temperatures_c: if index % 2 == 0 { vec![22.0, 22.5] } else { Vec::new() },
+            position_m: (pose.translation.vector.map(|value| value + stream.uniform(-1e-3, 1e-3))).into(),
+            attitude_xyzw: (index % 3 != 0).then(|| pose.rotation.coords.into()),
+        }));
+    }
+    events.push(Event::Note("fitting".to_owned()));
+    let summary = |stream: &mut Stream| Summary { min: 0.0, mean: stream.uniform(0.0, 1e-3), rms: 1e-3, max: 2e-3 };
+    let errors = |stream: &mut Stream, rotation: bool| Errors {
+        count: size.measurements,
+        position_m: summary(stream),
+        rotation_rad: rotation.then(|| summary(stream)),
+    };
+    let parameters = arm().chain.parameters;
+    events.push(Event::Identified(Identification {
+        converged: true,
+        reason: "the step is small".to_owned(),
+        iterations: 4,
+        rank: 27,
+        equations: 120,
+        residual_scale: stream.uniform(0.8, 1.2),
+        parameters: parameters
+            .iter()
+            .enumerate()
+            .map(|(number, parameter)| ParameterEstimate {
+                name: parameter.name.clone(),
+                nominal: parameter.nominal,
+                identified: parameter.nominal + stream.uniform(-1e-3, 1e-3),
+                standard_error: (number % 4 != 0).then(|| stream.uniform(0.0, 1e-4)),
+                unit: parameter.quantity.unit().to_owned(),
+                dropped: number % 4 == 0,
+            })
+            .collect(),
+        combinations: vec![Combination {
+            name: "a2".to_owned(),
+            expression: "a2 + 0.5 · d1".to_owned(),
+            estimate: stream.uniform(-1e-3, 1e-3),
+            standard_error: stream.uniform(0.0, 1e-5),
+            interval95: [-1e-3, 1e-3],
+            unit: "m".to_owned(),
+        }],
+        nominal: errors(&mut stream, true),
+        fitted: errors(&mut stream, false),
+        held_out: Some(errors(&mut stream, true)),
+        held_out_nominal: None,
+        residuals: (0..size.measurements)
+            .map(|index| Residual {
+                index,
+                position_m: [0, 1, 2].map(|_| stream.uniform(-1.0, 1.0)),
+                nominal: [0; 6].map(|_| stream.uniform(-1e-3, 1e-3)),
+                identified: [0; 6].map(|_| stream.uniform(-1e-5, 1e-5)),
+            })
+            .collect(),
+        notes: vec!["weights: declared noise".to_owned()],
+    }));
+    events
+}
+
+fn record(directory: &Path, events: &[Event]) -> PathBuf {
+    let mut recorder = Recorder::create(directory, "run", &arm()).unwrap();
+    for event in events {
+        recorder.take(event).unwrap();
+    }
+    recorder.finish().unwrap()
+}
+
+/// Equal to the bit: all numbers of `Debug` are shortest round-trip, and `-0.0` is written as such.
+fn assert_same(read: &[Event], written: &[Event]) {
+    assert_eq!(read.len(), written.len());
+    for (read, written) in read.iter().zip(written) {
+        assert_eq!(read, written);
+        assert_eq!(format!("{read:?}"), format!("{written:?}"));
+    }
+}
+
+#[test]
+fn events_come_back_bit_for_bit() {
+    let directory = tempfile::tempdir().unwrap();
+    let events = events(&SMALL);
+    let path = record(directory.path(), &events);
+    assert_eq!(path, directory.path().join("run.mcap"));
+    assert!(!directory.path().join("run.partial.mcap").exists());
+    let recording = read(&path).unwrap();
+    assert!(recording.is_complete(), "{:?}", recording.cut);
+    assert_eq!(recording.version_warning, None);
+    assert_same(&recording.events, &events);
+}
+
+#[test]
+fn the_same_events_give_the_same_bytes() {
+    let directory = tempfile::tempdir().unwrap();
+    let events = events(&SMALL);
+    let first = fs::read(record(&directory.path().join("a"), &events)).unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(20));
+    assert_eq!(first, fs::read(record(&directory.path().join("b"), &events)).unwrap());
+}
+
+#[test]
+fn times_never_go_backwards_and_every_event_stands_in_one_chunk() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = record(directory.path(), &events(&SMALL));
+    let bytes = fs::read(&path).unwrap();
+    let (mut last, mut event, mut offset) = (0, 0, 0);
+    let mut messages = Messages::open(&path).unwrap();
+    while let Some(message) = messages.next() {
+        let message = message.unwrap();
+        assert!(message.log_time_ns >= last);
+        // The queue is empty again when a chunk has been used up.
+        if message.event == event {
+            assert!(offset == 0 || offset == messages.offset(), "event {event} is split");
+        }
+        (last, event, offset) = (message.log_time_ns, message.event, messages.offset());
+        assert!(message.topic().is_some());
+    }
+    assert_eq!(messages.cut(), None);
+    // 0.1 s each: 24 iterations, the design, the lead to the session, the identification; 19 poses every 12.5 s.
+    assert_eq!(last, 100_000_000 * (24 + 1 + 1 + 1) + 19 * 12_500_000_000);
+    assert!(bytes.len() < 200_000, "{} bytes", bytes.len());
+}
+
+#[test]
+fn a_truncated_recording_is_readable_up_to_its_last_whole_chunk() {
+    let directory = tempfile::tempdir().unwrap();
+    let events = events(&SMALL);
+    let bytes = fs::read(record(directory.path(), &events)).unwrap();
+    let path = directory.path().join("cut.mcap");
+    let mut counts = std::collections::BTreeSet::new();
+    for length in (0..bytes.len()).step_by(97).chain(bytes.len() - 60..bytes.len()) {
+        fs::write(&path, &bytes[..length]).unwrap();
+        match read(&path) {
+            Ok(recording) => {
+                let cut = recording.cut.clone().unwrap();
+                assert!(!cut.damaged, "{length}: {cut}");
+                assert!(cut.offset <= length as u64 && cut.file_length == length as u64);
+                assert!(cut.to_string().contains("cut.mcap is cut off"), "{cut}");
+                assert_same(&recording.events, &events[..recording.events.len()]);
+                counts.insert(recording.events.len());
+            }
+            Err(ReadError::Empty { .. }) => assert_eq!(length, 0),
+            Err(ReadError::Nothing(cut)) => assert!(!cut.damaged && length < 20_000, "{length}: {cut}"),
+            Err(error) => panic!("{length}: {error}"),
+        }
+    }
+    // Start; note and iterations by tens; the design; measurements by sixteens; all. Chunk by chunk.
+    assert_eq!(counts.into_iter().collect::<Vec<_>>(), [1, 12, 22, 27, 43, 49]);
+}
+
+#[test]
+fn an_altered_byte_is_noticed_wherever_it_is() {
+    let directory = tempfile::tempdir().unwrap();
+    let events = events(&SMALL);
+    let bytes = fs::read(record(directory.path(), &events)).unwrap();
+    let path = directory.path().join("damaged.mcap");
+    let mut altered = bytes.clone();
+    for (number, at) in (0..bytes.len()).step_by(53).chain(bytes.len() - 400..bytes.len()).enumerate() {
+        altered[at] ^= [0x01, 0x80, 0xff, 0x10][number % 4];
+        fs::write(&path, &altered).unwrap();
+        match read(&path) {
+            Ok(recording) => {
+                let cut = recording.cut.clone().unwrap_or_else(|| panic!("byte {at} of {} is not noticed", bytes.len()));
+                // Without its end magic the file looks cut off.
+                assert!(cut.damaged || at >= bytes.len() - 8, "{at}: {cut}");
+                assert_same(&recording.events, &events[..recording.events.len()]);
+            }
+            Err(ReadError::NotMcap { .. }) => assert!(at < 8),
+            Err(ReadError::Nothing(cut)) => assert!(cut.damaged && at < 20_000, "{at}: {cut}"),
+            Err(error) => panic!("{at}: {error}"),
+        }
+        altered[at] = bytes[at];
+    }
+}
+
+#[test]
+fn arbitrary_bytes_never_panic() {
+    let directory = tempfile::tempdir().unwrap();
+    let bytes = fs::read(record(directory.path(), &events(&SMALL))).unwrap();
+    let path = directory.path().join("noise.mcap");
+    let mut stream = stream(3, "test/recording/noise");
+    for _ in 0..400 {
+        let mut noise = bytes.clone();
+        for _ in 0..1 + (stream.uniform(0.0, 1.0) * 40.0) as usize {
+            // Half of the changes go to the first kilobytes, where header, schemas and lengths are.
+            let end = if stream.uniform(0.0, 1.0) < 0.5 { noise.len() as f64 } else { 3000.0 };
+            let at = stream.uniform(8.0, end) as usize;
+            noise[at] = stream.uniform(0.0, 256.0) as u8;
+        }
+        noise.truncate(stream.uniform(0.0, 1.5 * noise.len() as f64) as usize);
+        fs::write(&path, &noise).unwrap();
+        let _ = read(&path).map(|recording| assert!(recording.cut.is_some()));
+        let mut random: Vec<u8> = mcap::MAGIC.to_vec();
+        random.extend(
+            (0..300).map(|_| stream.uniform(0.0, 256.0) as u8 & if stream.uniform(0.0, 1.0) < 0.5 { 0x0f } else { 0xff }),
+        );
+        fs::write(&path, &random).unwrap();
+        read(&path).unwrap_err();
+    }
+}
+
+#[test]
+fn a_killed_run_leaves_its_last_chunks_and_the_earlier_recording() {
+    let directory = tempfile::tempdir().unwrap();
+    let events = events(&SMALL);
+    let whole = fs::read(record(directory.path(), &events)).unwrap();
+    let mut recorder = Recorder::create(directory.path(), "run", &arm()).unwrap();
+    for event in &events[..20] {
+        recorder.take(event).unwrap();
+    }
+    // What SIGKILL leaves: nothing that was buffered is written any more.
+    std::mem::forget(recorder);
+    let recording = read(&directory.path().join("run.partial.mcap")).unwrap();
+    let cut = recording.cut.clone().unwrap();
+    assert!(!cut.damaged);
+    assert_eq!((recording.events.len(), cut.last_time_ns), (12, Some(1_000_000_000)));
+    assert_same(&recording.events, &events[..12]);
+    assert_eq!(fs::read(directory.path().join("run.mcap")).unwrap(), whole);
+}
+
+#[test]
+fn a_run_that_fails_keeps_all_it_had_and_does_not_look_whole() {
+    let directory = tempfile::tempdir().unwrap();
+    let events = events(&SMALL);
+    let mut recorder = Recorder::create(directory.path(), "run", &arm()).unwrap();
+    for event in &events[..20] {
+        recorder.take(event).unwrap();
+    }
+    drop(recorder);
+    let recording = read(&directory.path().join("run.partial.mcap")).unwrap();
+    assert!(!recording.is_complete());
+    assert_same(&recording.events, &events[..20]);
+    assert!(!directory.path().join("run.mcap").exists());
+    // The next run takes the partial file over.
+    record(directory.path(), &events);
+    assert!(!directory.path().join("run.partial.mcap").exists());
+}
+
+#[test]
+fn two_runs_of_one_name_do_not_write_into_each_other() {
+    let directory = tempfile::tempdir().unwrap();
+    let first = Recorder::create(directory.path(), "run", &arm()).unwrap();
+    let error = Recorder::create(directory.path(), "run", &arm()).err().unwrap();
+    assert!(matches!(error, RecordError::Busy { .. }), "{error}");
+    drop(first);
+    Recorder::create(directory.path(), "run", &arm()).unwrap();
+}
+
+#[test]
+fn an_output_that_cannot_be_written_is_named_with_reason_and_remedy() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("file");
+    fs::write(&file, "x").unwrap();
+    let error = Recorder::create(&file.join("below"), "run", &arm()).err().unwrap().to_string();
+    assert!(error.contains("cannot create") && error.contains("file/below") && error.contains("choose an output"), "{error}");
+    fs::create_dir(directory.path().join("taken.mcap")).unwrap();
+    let error = Recorder::create(directory.path(), "taken", &arm()).err().unwrap().to_string();
+    assert!(error.contains("cannot replace") && error.contains("directory"), "{error}");
+}
+
+#[test]
+fn files_of_others_are_named_for_what_they_are() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("other.mcap");
+    let message = |path: &Path| read(path).unwrap_err().to_string();
+    assert!(message(&path).contains("cannot read"));
+    fs::write(&path, "").unwrap();
+    assert!(message(&path).contains("is empty"));
+    fs::write(&path, "#!/bin/sh\n").unwrap();
+    assert!(message(&path).contains("is no MCAP file (it begins with #!/bin/s)"), "{}", message(&path));
+    for (topic, schema, text) in
+        [("/imu", "sensor_msgs/Imu", "topics found: /imu (sensor_msgs/Imu)"), ("/run", "Other", "topics found: /run (Other)")]
+    {
+        let mut writer = mcap::Writer::new(fs::File::create(&path).unwrap()).unwrap();
+        let schema = writer.add_schema(schema, "ros1msg", b"").unwrap();
+        let channel_id = writer.add_channel(schema, topic, "ros1", &Default::default()).unwrap();
+        let header = mcap::records::MessageHeader { channel_id, sequence: 0, log_time: 5, publish_time: 5 };
+        writer.write_to_known_channel(&header, b"abc").unwrap();
+        writer.finish().unwrap();
+        assert!(message(&path).contains(text), "{}", message(&path));
+    }
+    let mut writer = mcap::Writer::new(fs::File::create(&path).unwrap()).unwrap();
+    writer.finish().unwrap();
+    assert!(message(&path).contains("topics found: none"), "{}", message(&path));
+}
+
+#[test]
+fn a_recording_of_a_newer_version_is_read_with_a_warning() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut events = events(&SMALL);
+    let Event::Start(start) = &mut events[0] else { panic!() };
+    start.version = "99.1.0-rc.2".to_owned();
+    let recording = read(&record(directory.path(), &events)).unwrap();
+    assert!(recording.version_warning.unwrap().contains("recorded by kincal 99.1.0-rc.2, this is"));
+    assert_same(&recording.events, &events);
+}
+
+#[test]
+fn what_cannot_be_read_back_is_refused() {
+    let mut events = events(&SMALL);
+    let refused = |event: &Event| Encoder::new(&arm()).encode(event).unwrap_err().to_string();
+    let Event::Swarm(swarm) = &mut events[2] else { panic!() };
+    swarm.fitness[3] = f64::NAN;
+    assert!(refused(&events[2]).starts_with("/design/swarm: fitness is NaN or infinite"), "{}", refused(&events[2]));
+    let Event::Measured(measurement) = &mut events[30] else { panic!() };
+    measurement.joints.pop();
+    assert_eq!(refused(&events[30]), "/measurement: a configuration has 5 joint coordinates, the arm has 6 joints");
+    let Some(Event::Identified(identification)) = events.last_mut() else { panic!() };
+    identification.parameters[1].standard_error = Some(f64::INFINITY);
+    assert!(refused(events.last().unwrap()).contains("NaN or infinite"));
+}
+
+fn replay(path: &Path, events: &[Event]) -> Comparison {
+    let mut comparer = Comparer::open(path, &arm()).unwrap();
+    events.iter().for_each(|event| comparer.take(event).unwrap());
+    comparer.finish().unwrap()
+}
+
+#[test]
+fn a_repeated_run_is_identical() {
+    let directory = tempfile::tempdir().unwrap();
+    let events = events(&SMALL);
+    let path = record(directory.path(), &events);
+    let comparison = replay(&path, &events);
+    assert!(comparison.identical() && comparison.cut.is_none(), "{comparison:?}");
+    assert_eq!((comparison.compared, comparison.missing, comparison.extra), (read(&path).unwrap().message_count, 0, 0));
+}
+
+fn next_up(value: &mut f64) {
+    *value = value.next_up();
+}
+
+#[test]
+fn a_change_in_the_last_bit_is_found_and_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let events = events(&SMALL);
+    let path = record(directory.path(), &events);
+    type Change = fn(&mut Event);
+    let cases: [(usize, Change, &str); 6] = [
+        (
+            4,
+            |event| {
+                if let Event::Swarm(swarm) = event {
+                    next_up(&mut swarm.best.o1)
+                }
+            },
+            "/design/swarm[2].best.o1: recorded 0.",
+        ),
+        (
+            4,
+            |event| {
+                if let Event::Swarm(swarm) = event {
+                    next_up(&mut swarm.fitness[6])
+                }
+            },
+            "/design/swarm[2].fitness[6]: recorded",
+        ),
+        (
+            5,
+            |event| {
+                if let Event::Swarm(swarm) = event {
+                    let value = &mut swarm.end_points[3][2][1];
+                    *value = value.next_up();
+                }
+            },
+            "/design/swarm/end_points[3].points[17].y: recorded",
+        ),
+        (
+            2,
+            |event| {
+                if let Event::Swarm(swarm) = event {
+                    swarm.best.o6 = 0.0
+                }
+            },
+            "/design/swarm[0].best.o6: recorded -0.0, recomputed 0.0 (message 4, 0.100 s)",
+        ),
+        (
+            31,
+            |event| {
+                if let Event::Measured(measurement) = event {
+                    measurement.attitude_xyzw = None
+                }
+            },
+            "/measurement[",
+        ),
+        (
+            48,
+            |event| {
+                if let Event::Identified(identification) = event {
+                    next_up(&mut identification.parameters[3].identified)
+                }
+            },
+            "/identification[0].parameters[3].identified: recorded",
+        ),
+    ];
+    for (number, change, expected) in cases {
+        let mut altered = events.clone();
+        change(&mut altered[number]);
+        let comparison = replay(&path, &altered);
+        let difference = comparison.first_difference.as_ref().unwrap().to_string();
+        assert!(!comparison.identical() && difference.starts_with(expected), "{difference}, expected {expected}");
+    }
+}
+
+#[test]
+fn missing_and_extra_events_are_counted() {
+    let directory = tempfile::tempdir().unwrap();
+    let events = events(&SMALL);
+    let path = record(directory.path(), &events);
+    let shorter = replay(&path, &events[..events.len() - 1]);
+    assert_eq!((shorter.identical(), shorter.missing, shorter.extra), (false, 4, 0));
+    assert!(shorter.first_difference.unwrap().to_string().starts_with("/identification[0].message: recorded"));
+    let mut longer = events.clone();
+    longer.push(Event::Note("more".to_owned()));
+    let longer = replay(&path, &longer);
+    assert_eq!((longer.identical(), longer.missing, longer.extra), (false, 0, 1));
+    // Of a recording that was cut off, what is there is compared.
+    let bytes = fs::read(&path).unwrap();
+    let cut = directory.path().join("cut.mcap");
+    fs::write(&cut, &bytes[..bytes.len() / 2]).unwrap();
+    let comparison = replay(&cut, &events);
+    assert!(comparison.identical() && comparison.extra > 0 && !comparison.cut.unwrap().damaged);
+}
+
+/// Checks a value against the part of JSON Schema that the schemas use, and that everything in it is described.
+fn check_schema(path: &str, schema: &Value, value: &Value) {
+    assert!(schema["description"].is_string() || path.ends_with(']'), "{path} is not described");
+    match schema["type"].as_str().unwrap_or_else(|| panic!("{path} has no type")) {
+        "object" => {
+            let (object, properties) = (value.as_object().unwrap(), schema["properties"].as_object().unwrap());
+            for (key, value) in object {
+                check_schema(&format!("{path}.{key}"), properties.get(key).unwrap_or_else(|| panic!("{path}.{key}")), value);
+            }
+            for key in schema["required"].as_array().unwrap() {
+                assert!(object.contains_key(key.as_str().unwrap()), "{path}.{key} is missing");
+            }
+        }
+        "array" => {
+            assert_ne!(schema["items"]["type"], "array", "{path}: Foxglove takes no arrays of arrays");
+            for (index, value) in value.as_array().unwrap().iter().enumerate() {
+                check_schema(&format!("{path}[{index}]"), &schema["items"], value);
+            }
+        }
+        "number" => assert!(value.is_number(), "{path}"),
+        "integer" => assert!(value.is_u64(), "{path}"),
+        "string" => assert!(value.is_string(), "{path}"),
+        "boolean" => assert!(value.is_boolean(), "{path}"),
+        other => panic!("{path}: {other}"),
+    }
+}
+
+#[test]
+fn json_messages_are_what_their_schemas_say() {
+    let mut encoder = Encoder::new(&arm());
+    let mut seen = std::collections::BTreeSet::new();
+    for event in events(&SMALL) {
+        for message in encoder.encode(&event).unwrap() {
+            seen.insert(message.topic);
+            let schema = message.topic.schema();
+            assert_eq!(schema.encoding, if message.topic.message_encoding() == "json" { "jsonschema" } else { "protobuf" });
+            if message.topic.message_encoding() == "json" {
+                let schema: Value = serde_json::from_slice(&schema.data).unwrap();
+                assert_eq!(schema["title"], message.topic.schema_name());
+                check_schema(message.topic.name(), &schema, &serde_json::from_slice(&message.data).unwrap());
+            }
+        }
+    }
+    assert_eq!(seen.into_iter().collect::<Vec<_>>(), Topic::ALL);
+}
+
+/// Not a test: writes a recording of the paper's size to look at, and times writing and reading.
+#[test]
+#[ignore = "writes to KINCAL_SAMPLE; for measuring and looking"]
+fn sample() {
+    let directory = PathBuf::from(std::env::var("KINCAL_SAMPLE").unwrap());
+    let events = events(&Size { iterations: 200, particles: 50, configurations: 60, measurements: 100 });
+    let clock = std::time::Instant::now();
+    let path = record(&directory, &events);
+    let (written, size) = (clock.elapsed(), fs::metadata(&path).unwrap().len());
+    let clock = std::time::Instant::now();
+    let recording = read(&path).unwrap();
+    let was_read = clock.elapsed();
+    let clock = std::time::Instant::now();
+    assert!(replay(&path, &events).identical());
+    println!("{} events, {} messages, {size} bytes", events.len(), recording.message_count);
+    println!("written in {written:?}, read in {was_read:?}, compared in {:?}", clock.elapsed());
+}
