@@ -12,3 +12,5 @@ pub mod quality;
 pub mod recording;
 pub mod scene;
 pub mod seed;
+#[cfg(feature = "viewer")]
+pub mod viewing;
