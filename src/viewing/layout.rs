@@ -5,38 +5,33 @@
 
 use rerun::EntityPath;
 use rerun::blueprint::components::{
-    ActiveTab, ColumnShare, ContainerKind, Corner2D, Eye3DKind, Fps, IncludedContent, PanelState, PlayState, QueryExpression,
-    RootContainer, RowShare, TimelineName, ViewClass, VisualBounds2D,
+    ActiveTab, BackgroundKind, ColumnShare, ContainerKind, Corner2D, Eye3DKind, Fps, IncludedContent, PanelState, PlayState,
+    QueryExpression, RootContainer, RowShare, TimelineName, ViewClass, VisualBounds2D,
 };
 use rerun::components::{Name, Position3D, Vector3D};
 use rerun::external::re_log_types::BlueprintActivationCommand;
 use rerun::external::re_sdk_types::blueprint::archetypes::{
-    ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend, TimePanelBlueprint, ViewBlueprint, ViewContents,
-    ViewportBlueprint, VisualBounds2D as VisualBounds,
+    Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend, TimePanelBlueprint, ViewBlueprint,
+    ViewContents, ViewportBlueprint, VisualBounds2D as VisualBounds,
 };
 use rerun::external::re_sdk_types::datatypes::{Float32, Float64, Range1D, Range2D, Uuid};
 use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
 
 use super::{chart, picture};
 
+const BACKGROUND: [u8; 3] = [20, 22, 28];
+
 /// Which parts of a run there are to see.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Parts {
     pub(super) swarm: bool,
     pub(super) measured: bool,
-    pub(super) identified: bool,
 }
 
 impl Parts {
     /// What the run of a command shows; all of it for a command that is not known here.
     pub(super) fn of(command: &str) -> Parts {
-        let (swarm, measured, identified) = match command {
-            "design" => (true, false, false),
-            "measure" => (false, true, false),
-            "identify" => (false, true, true),
-            _ => (true, true, true),
-        };
-        Parts { swarm, measured, identified }
+        Parts { swarm: !matches!(command, "measure" | "identify"), measured: command != "design" }
     }
 }
 
@@ -132,7 +127,10 @@ fn scene(name: &str, contents: &[&'static str], camera: Camera) -> Node {
         .with_position(Position3D::from(camera.position))
         .with_look_target(Position3D::from(camera.target))
         .with_eye_up(Vector3D::from(camera.up));
-    view("3D", name, contents).with("EyeControls3D", eye).with("LineGrid3D", LineGrid3D::new().with_visible(false))
+    view("3D", name, contents)
+        .with("EyeControls3D", eye)
+        .with("LineGrid3D", LineGrid3D::new().with_visible(false))
+        .with("Background", Background::new(BackgroundKind::SolidColor).with_color(BACKGROUND))
 }
 
 fn plot(name: &str, contents: &[&'static str], legend: bool) -> Node {
@@ -163,7 +161,7 @@ fn tree(parts: Parts, camera: Camera) -> Node {
     };
     let residuals = || {
         scene(
-            "Residuals: before (orange), after (green), to their own scales",
+            "Residuals: measured minus predicted, before and after",
             &["/world/base/**", "/world/cell/**", "/world/residuals/**"],
             camera,
         )
@@ -183,25 +181,29 @@ fn tree(parts: Parts, camera: Camera) -> Node {
             plot("Temperatures, °C", &["/temperatures/**"], true),
         ])
     };
-    let side = rows(vec![(3.0, summary), (1.0, notes)]);
-    match (parts.swarm, parts.measured, parts.identified) {
-        (true, false, _) => columns(vec![
+    let side = tabs(vec![summary, notes]);
+    match (parts.swarm, parts.measured) {
+        (true, false) => columns(vec![
             (4.0, rows(vec![(3.0, cell), (2.0, indexes())])),
             (3.0, rows(vec![(3.0, swarm()), (2.0, fitness())])),
             (3.0, side),
         ]),
-        (false, _, false) => columns(vec![(4.0, cell), (3.0, rows(vec![(3.0, side), (2.0, errors())]))]),
-        (false, _, true) => columns(vec![(4.0, rows(vec![(3.0, cell), (2.0, errors())])), (4.0, residuals()), (3.0, side)]),
-        (true, true, _) => columns(vec![
-            (4.0, rows(vec![(3.0, cell), (1.0, indexes()), (1.0, fitness())])),
+        (true, true) => columns(vec![
+            (4.0, rows(vec![(10.0, cell), (5.0, indexes()), (4.0, fitness())])),
             (4.0, rows(vec![(1.0, residuals()), (1.0, swarm())])),
-            (3.0, rows(vec![(3.0, side), (2.0, errors())])),
+            (3.0, rows(vec![(2.0, side), (1.0, errors())])),
         ]),
+        (false, _) => columns(vec![(4.0, cell), (4.0, residuals()), (3.0, rows(vec![(2.0, side), (1.0, errors())]))]),
     }
 }
 
 /// Sends the blueprint of a run and makes it the active one.
-pub(super) fn send(stream: &RecordingStream, application: &'static str, parts: Parts, camera: Camera) -> RecordingStreamResult<()> {
+pub(super) fn send(
+    stream: &RecordingStream,
+    application: &'static str,
+    parts: Parts,
+    camera: Camera,
+) -> RecordingStreamResult<()> {
     let (blueprint, storage) = RecordingStreamBuilder::new(application).enabled(true).blueprint().memory()?;
     blueprint.set_time_sequence("blueprint", 0);
     let (_, root) = tree(parts, camera).log(&blueprint, &mut 0)?;

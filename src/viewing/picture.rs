@@ -34,6 +34,7 @@ const POSES: &str = "pose";
 const TIME: &str = "time";
 
 const AMBER: [u8; 3] = [255, 184, 56];
+const AMBER_LINES: [u8; 3] = [92, 76, 48];
 const FIT: [u8; 3] = [72, 200, 150];
 const HELD_OUT: [u8; 3] = [186, 132, 255];
 const BEFORE: [u8; 3] = [240, 128, 84];
@@ -57,18 +58,11 @@ pub(super) struct Picture {
     event: i64,
     best: Vec<Vec<f64>>,
     summary: Summary,
-    measured: Vec<Measured>,
+    /// Measured minus nominal; what is measured minus identified is not known before the end.
+    measured: Vec<Residual>,
     roles: BTreeMap<usize, Role>,
     series_named: bool,
-}
-
-#[derive(Debug)]
-struct Measured {
-    index: usize,
-    role: Role,
-    position: [f32; 3],
-    error_m: f64,
-    error_deg: Option<f64>,
+    temperatures_named: bool,
 }
 
 impl Picture {
@@ -82,6 +76,7 @@ impl Picture {
             measured: Vec::new(),
             roles: BTreeMap::new(),
             series_named: false,
+            temperatures_named: false,
         })
     }
 
@@ -197,10 +192,10 @@ impl Picture {
             .filter_map(|joints| self.body.tool(joints))
             .map(|tool| point(&tool.translation.vector))
             .collect();
-        let chosen = Points3D::new(tools).with_colors([AMBER]).with_radii([self.size(0.011)]);
+        let chosen = Points3D::new(tools).with_colors([AMBER]).with_radii([self.size(0.006)]);
         stream.log("world/design/end_points", &chosen)?;
         let arms = design.configurations.iter().take(LINES).map(|joints| self.body.skeleton(joints));
-        let arms = LineStrips3D::new(arms).with_colors([[AMBER[0], AMBER[1], AMBER[2], 60]]);
+        let arms = LineStrips3D::new(arms).with_colors([AMBER_LINES]);
         stream.log("world/design/configurations", &arms.with_radii([Radius::new_ui_points(0.5)]))?;
         if let Some(first) = design.configurations.first() {
             self.body.log_configuration(stream, first)?;
@@ -213,123 +208,98 @@ impl Picture {
         stream.set_time_sequence(POSES, measurement.index as i64);
         stream.set_duration_secs(TIME, measurement.time_s);
         self.body.log_configuration(stream, &measurement.joints)?;
-        let position = measurement.position().coords;
-        let colour = role_colour(measurement.role);
-
-        let predicted = self.body.tool(&measurement.joints);
         let attitude = measurement.attitude();
-        let measured = Pose::from_parts(position.into(), attitude.unwrap_or_default());
-        let mut error = (f64::NAN, None);
-        if let Some(predicted) = &predicted {
-            let difference = pose_error(&measured, predicted);
-            let turn = difference.fixed_rows::<3>(3).norm().to_degrees();
-            error = (difference.fixed_rows::<3>(0).norm(), attitude.map(|_| turn));
-            stream.log("world/measured/predicted", &transform(predicted))?;
-            let axes = TransformAxes3D::new((0.05 * self.body.stretch) as f32);
-            stream.log("world/measured/predicted", &axes)?;
-        }
+        let measured = Pose::from_parts(measurement.position().coords.into(), attitude.unwrap_or_default());
         stream.log("world/measured/now", &transform(&measured))?;
         if attitude.is_some() {
             stream.log("world/measured/now", &TransformAxes3D::new((0.09 * self.body.stretch) as f32))?;
         }
-        // Measured and predicted poses are too close to be told apart in the cell: a label says how far they are.
-        let label = match error {
-            (distance, Some(turn)) => format!("{} mm, {}° off nominal", significant(distance * 1e3, 3), significant(turn, 3)),
-            (distance, None) => format!("{} mm off nominal", significant(distance * 1e3, 3)),
-        };
-        let here = Points3D::new([point(&position)])
-            .with_colors([PREDICTED])
-            .with_radii([self.size(0.012)])
-            .with_labels([label])
-            .with_show_labels(true);
-        stream.log("world/measured/tool", &here)?;
-
         self.roles.insert(measurement.index, measurement.role);
-        self.measured.push(Measured {
-            index: measurement.index,
-            role: measurement.role,
-            position: point(&position),
-            error_m: error.0,
-            error_deg: error.1,
-        });
-        let block = (self.measured.len() - 1) / BLOCK;
-        let members = &self.measured[block * BLOCK..];
-        let points = Points3D::new(members.iter().map(|m| m.position))
-            .with_colors(members.iter().map(|m| role_colour(m.role)))
-            .with_radii([self.size(0.008)]);
-        stream.log(format!("world/measured/points/{block}"), &points)?;
-        let _ = colour;
+        if let Some(predicted) = self.body.tool(&measurement.joints) {
+            stream.log("world/measured/predicted", &transform(&predicted))?;
+            stream.log("world/measured/predicted", &TransformAxes3D::new((0.05 * self.body.stretch) as f32))?;
+            let mut difference: [f64; 6] = pose_error(&measured, &predicted).into();
+            if attitude.is_none() {
+                difference[3..].fill(0.0);
+            }
+            // Measured and predicted poses are too close to be told apart in the cell: a label says how far they are.
+            let mut label = format!("{} mm", significant(length(&difference[..3]) * 1e3, 3));
+            if attitude.is_some() {
+                label += &format!(", {}°", significant(length(&difference[3..]).to_degrees(), 3));
+            }
+            let here = Points3D::new([point(&measured.translation.vector)])
+                .with_colors([PREDICTED])
+                .with_radii([self.size(0.012)])
+                .with_labels([label + " off nominal"])
+                .with_show_labels(true);
+            stream.log("world/measured/tool", &here)?;
+            self.measured.push(Residual {
+                index: measurement.index,
+                position_m: measurement.position_m,
+                nominal: difference,
+                identified: [0.0; 6],
+            });
+            let block = (self.measured.len() - 1) / BLOCK;
+            let members = &self.measured[block * BLOCK..];
+            let points = Points3D::new(members.iter().map(|r| r.position_m.map(|x| x as f32)))
+                .with_colors(members.iter().map(|r| role_colour(self.role(r))))
+                .with_radii([self.size(0.01)]);
+            stream.log(format!("world/measured/points/{block}"), &points)?;
+        }
 
         if !measurement.temperatures_c.is_empty() {
-            if self.measured.len() == 1 {
+            if !self.temperatures_named {
+                self.temperatures_named = true;
                 let names = self.body.arm().links.iter().map(|link| link.name.as_str()).take(measurement.temperatures_c.len());
                 stream.log_static("temperatures", &SeriesLines::new().with_names(names.collect::<Vec<_>>()))?;
             }
             stream.log("temperatures", &Scalars::new(measurement.temperatures_c.iter().copied()))?;
         }
-        // The whole chart is drawn anew; ever more rarely, so that the work stays in proportion to the measurements.
+        // Chart and arrows are drawn anew, ever more rarely, so that the work stays in proportion to the measurements.
         let count = self.measured.len();
-        if count <= BLOCK || count.is_multiple_of(count / (BLOCK / 2)) {
-            self.log_errors_so_far(stream)?;
+        if count > 0 && (count <= BLOCK || count.is_multiple_of(count / (BLOCK / 2))) {
+            let scale = self.arrows(stream, "before", &self.measured, |r| &r.nominal, [BEFORE, BEFORE_HELD_OUT])?;
+            self.log_scales(stream, &[scale])?;
+            self.log_errors(stream, &self.measured, false)?;
         }
         self.summary.measured(measurement);
         Ok(())
     }
 
-    fn log_errors_so_far(&self, stream: &RecordingStream) -> RecordingStreamResult<()> {
-        let of = |role: Role, value: &dyn Fn(&Measured) -> Option<f64>| {
-            self.measured.iter().filter(|m| m.role == role).filter_map(|m| value(m).map(|v| (m.index, v))).collect::<Vec<_>>()
-        };
-        for (path, unit, value) in [
-            ("errors/position", Unit::Metre, &(|m: &Measured| Some(m.error_m)) as &dyn Fn(&Measured) -> Option<f64>),
-            ("errors/attitude", Unit::Degree, &|m: &Measured| m.error_deg),
-        ] {
-            let series = [
-                Series { name: "before".to_owned(), colour: BEFORE, values: of(Role::Fit, value) },
-                Series { name: "before, held out".to_owned(), colour: BEFORE_HELD_OUT, values: of(Role::HeldOut, value) },
-            ];
-            chart::log(stream, path, unit, &series)?;
+    fn identified(&mut self, stream: &RecordingStream, identified: &Identification) -> RecordingStreamResult<()> {
+        let residuals = &identified.residuals;
+        let mut scales = Vec::new();
+        if !residuals.is_empty() {
+            scales.push(self.arrows(stream, "before", residuals, |r| &r.nominal, [BEFORE, BEFORE_HELD_OUT])?);
+            scales.push(self.arrows(stream, "after", residuals, |r| &r.identified, [FIT, HELD_OUT])?);
+            self.log_scales(stream, &scales)?;
         }
+        self.log_errors(stream, residuals, true)?;
+        self.summary.identified(identified, &scales);
         Ok(())
     }
 
-    fn identified(&mut self, stream: &RecordingStream, identified: &Identification) -> RecordingStreamResult<()> {
-        let residuals = &identified.residuals;
-        let before = self.arrows(stream, "before", residuals, |r| &r.nominal, [BEFORE, BEFORE_HELD_OUT])?;
-        let after = self.arrows(stream, "after", residuals, |r| &r.identified, [FIT, HELD_OUT])?;
-        let scales: Vec<String> = [before, after].into_iter().flatten().collect();
-        self.log_scales(stream, &scales)?;
-
-        let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let turned = residuals.iter().any(|r| norm(&r.nominal[3..]) > 0.0 || norm(&r.identified[3..]) > 0.0);
-        let of = |role: Role, after: bool, turn: bool| {
-            residuals
+    /// Charts of the error of each configuration; `after`: those of the identified model too.
+    fn log_errors(&self, stream: &RecordingStream, residuals: &[Residual], after: bool) -> RecordingStreamResult<()> {
+        let kinds: [(&str, [u8; 3], Role, fn(&Residual) -> &[f64; 6]); 4] = [
+            ("before", BEFORE, Role::Fit, |r| &r.nominal),
+            ("before, held out", BEFORE_HELD_OUT, Role::HeldOut, |r| &r.nominal),
+            ("after", FIT, Role::Fit, |r| &r.identified),
+            ("after, held out", HELD_OUT, Role::HeldOut, |r| &r.identified),
+        ];
+        let position: fn(&[f64; 6]) -> f64 = |six| length(&six[..3]);
+        let attitude: fn(&[f64; 6]) -> f64 = |six| length(&six[3..]).to_degrees();
+        for (path, unit, error) in [("errors/position", Unit::Metre, position), ("errors/attitude", Unit::Degree, attitude)] {
+            let series: Vec<Series> = kinds[..if after { 4 } else { 2 }]
                 .iter()
-                .filter(|r| self.role(r) == role)
-                .map(|r| {
-                    let six = if after { &r.identified } else { &r.nominal };
-                    (r.index, if turn { norm(&six[3..]).to_degrees() } else { norm(&six[..3]) })
+                .map(|(name, colour, role, vector)| {
+                    let members = residuals.iter().filter(|r| self.role(r) == *role);
+                    let values = members.map(|r| (r.index, error(vector(r)))).collect();
+                    Series { name: (*name).to_owned(), colour: *colour, values }
                 })
-                .collect::<Vec<_>>()
-        };
-        for (path, unit, turn) in [("errors/position", Unit::Metre, false), ("errors/attitude", Unit::Degree, true)] {
-            if turn && !turned {
-                continue;
-            }
-            let series = [
-                ("before", BEFORE, Role::Fit, false),
-                ("before, held out", BEFORE_HELD_OUT, Role::HeldOut, false),
-                ("after", FIT, Role::Fit, true),
-                ("after, held out", HELD_OUT, Role::HeldOut, true),
-            ]
-            .map(|(name, colour, role, after)| Series {
-                name: name.to_owned(),
-                colour,
-                values: of(role, after, turn),
-            });
+                .collect();
             chart::log(stream, path, unit, &series)?;
         }
-        self.summary.identified(identified, &scales);
         Ok(())
     }
 
@@ -337,7 +307,7 @@ impl Picture {
         self.roles.get(&residual.index).copied().unwrap_or(Role::Fit)
     }
 
-    /// Draws one set of residuals so that the mean arrow is a fifteenth of the arm; returns the scale in words.
+    /// Draws one set of residuals so that the mean arrow is about a tenth of the arm; returns the scale in words.
     fn arrows(
         &self,
         stream: &RecordingStream,
@@ -345,10 +315,9 @@ impl Picture {
         residuals: &[Residual],
         vector: fn(&Residual) -> &[f64; 6],
         [fit, held_out]: [[u8; 3]; 2],
-    ) -> RecordingStreamResult<Option<String>> {
-        let length = |r: &Residual| vector(r)[..3].iter().map(|x| x * x).sum::<f64>().sqrt();
-        let mean = residuals.iter().map(length).sum::<f64>() / residuals.len().max(1) as f64;
-        let scale = if mean > 0.0 && mean.is_finite() { round(0.065 * self.body.stretch / mean) } else { 1.0 };
+    ) -> RecordingStreamResult<String> {
+        let mean = residuals.iter().map(|r| length(&vector(r)[..3])).sum::<f64>() / residuals.len().max(1) as f64;
+        let scale = if mean > 0.0 && mean.is_finite() { round(0.09 * self.body.stretch / mean) } else { 1.0 };
         let vectors = residuals.iter().map(|r| {
             let v = vector(r);
             [v[0], v[1], v[2]].map(|x| (x * scale) as f32)
@@ -357,13 +326,9 @@ impl Picture {
         let arrows = Arrows3D::from_vectors(vectors)
             .with_origins(residuals.iter().map(|r| r.position_m.map(|x| x as f32)))
             .with_colors(colours)
-            .with_radii([self.size(0.0025)]);
+            .with_radii([self.size(0.0035)]);
         stream.log(format!("world/residuals/{name}"), &arrows)?;
-        if residuals.is_empty() {
-            return Ok(None);
-        }
-        let tenth = significant(0.1 / scale * 1e6, 3);
-        Ok(Some(format!("{name}: ×{scale}, 10 cm of arrow = {tenth} µm")))
+        Ok(format!("arrows {name} ×{scale}: 10 cm = {}", metres(0.1 / scale)))
     }
 
     /// The scales as labels above the arm.
@@ -378,6 +343,23 @@ impl Picture {
             .with_radii([Radius::new_ui_points(0.0)]);
         stream.log("world/residuals/scales", &labels)
     }
+}
+
+fn length(vector: &[f64]) -> f64 {
+    vector.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// A length in the unit that reads best: `2 mm`, `20 µm`.
+fn metres(value: f64) -> String {
+    let (factor, unit) = match value {
+        _ if value >= 1.0 => (1.0, "m"),
+        _ if value >= 1e-3 => (1e3, "mm"),
+        _ if value >= 1e-6 => (1e6, "µm"),
+        _ => (1e9, "nm"),
+    };
+    // Scales are round numbers: what is past the third digit is rounding.
+    let rounded = libm::round(value * factor * 1e3) / 1e3;
+    format!("{rounded} {unit}")
 }
 
 fn role_colour(role: Role) -> [u8; 3] {
@@ -455,6 +437,11 @@ fn name_series(stream: &RecordingStream, particles: usize) -> RecordingStreamRes
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lengths_are_written_in_the_unit_that_reads_best() {
+        assert_eq!([0.002, 2e-5, 5e-8, 1.0].map(metres), ["2 mm", "20 µm", "50 nm", "1 m"]);
+    }
 
     #[test]
     fn scales_are_round_numbers() {

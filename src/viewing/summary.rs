@@ -21,12 +21,12 @@ pub(super) struct Summary {
 
 impl Summary {
     pub(super) fn start(&mut self, name: &str, arm: &str, start: &Start) {
-        self.head = format!("# {name}: {}\narm {arm}, kincal {}\n\n", start.command, start.version);
+        self.head = format!("### {name}: {}\narm {arm}, kincal {}\n\n", start.command, start.version);
     }
 
     pub(super) fn swarm(&mut self, swarm: &SwarmIteration) {
         self.swarm = format!(
-            "## Swarm\niteration {} of {}: O_C = {} after {} evaluations, {} rejections\n\n",
+            "#### Swarm\niteration {} of {}: O_C = {} after {} evaluations, {} rejections\n\n",
             swarm.iteration,
             swarm.iterations,
             significant(swarm.best.comprehensive, 5),
@@ -43,7 +43,7 @@ impl Summary {
             StopReason::Drawn => "drawn",
         };
         let mut text = format!(
-            "## Design\n{} configurations by `{}`: {stop}, {} evaluations, {} rejections; rank {}.\n\n\
+            "#### Design\n{} configurations by `{}`: {stop}, {} evaluations, {} rejections; rank {}.\n\n\
              | index | chosen | random, mean | random, range |\n|---|---|---|---|\n",
             design.configurations.len(),
             design.method,
@@ -81,7 +81,7 @@ impl Summary {
     /// `scales` states how long the arrows of the residuals are drawn.
     pub(super) fn identified(&mut self, identified: &Identification, scales: &[String]) {
         let mut text = format!(
-            "## Identified\n**{}** after {} iterations: {}. Rank {} of {} parameters, {} equations, residual scale {}.\n\n",
+            "#### Identified\n**{}** after {} iterations: {}. Rank {} of {} parameters, {} equations, residual scale {}.\n\n",
             if identified.converged { "converged" } else { "NOT CONVERGED" },
             identified.iterations,
             identified.reason.trim_end_matches('.'),
@@ -90,10 +90,7 @@ impl Summary {
             identified.equations,
             significant(identified.residual_scale, 4),
         );
-        if let (Some(before), Some(after)) = (&identified.held_out_nominal, &identified.held_out) {
-            write!(text, "Held out ({}):\n\n{}\n", after.count, table(before, after)).ok();
-        }
-        write!(text, "Fitted ({}):\n\n{}\n", identified.fitted.count, table(&identified.nominal, &identified.fitted)).ok();
+        text += &table(identified);
         if !scales.is_empty() {
             text += "Arrows of the residuals:\n\n";
             for scale in scales {
@@ -113,27 +110,43 @@ impl Summary {
         let measured = if fit + held_out == 0 {
             String::new()
         } else {
-            format!("## Measured\n{fit} to fit, {held_out} held out; {} min.\n\n", significant(self.session_s / 60.0, 3))
+            format!("#### Measured\n{fit} to fit, {held_out} held out; {} min.\n\n", significant(self.session_s / 60.0, 3))
         };
         [&self.head, &self.identified, &measured, &self.swarm, &self.design].into_iter().map(String::as_str).collect()
     }
 }
 
-fn table(before: &Errors, after: &Errors) -> String {
-    let mut text = "| error | before | after |\n|---|---|---|\n".to_owned();
-    rows(&mut text, "mm", 1e3, &before.position_m, &after.position_m);
-    if let (Some(before), Some(after)) = (&before.rotation_rad, &after.rotation_rad) {
-        rows(&mut text, "deg", 1f64.to_degrees(), before, after);
+/// Errors before and after, on held-out configurations first where there are any.
+fn table(identified: &Identification) -> String {
+    let mut pairs: Vec<(&str, &Errors, &Errors)> = Vec::new();
+    if let (Some(before), Some(after)) = (&identified.held_out_nominal, &identified.held_out) {
+        pairs.push(("held out", before, after));
     }
-    text
-}
-
-fn rows(text: &mut String, unit: &str, factor: f64, before: &Numbers, after: &Numbers) {
-    for (name, before, after) in
-        [("mean", before.mean, after.mean), ("rms", before.rms, after.rms), ("max", before.max, after.max)]
-    {
-        writeln!(text, "| {name}, {unit} | {} | {} |", significant(before * factor, 4), significant(after * factor, 4)).ok();
+    pairs.push(("fitted", &identified.nominal, &identified.fitted));
+    let mut text = "| error |".to_owned();
+    for (name, _, after) in &pairs {
+        write!(text, " {name} ({}), before | after |", after.count).ok();
     }
+    write!(text, "\n|---|{}\n", "---|---|".repeat(pairs.len())).ok();
+    let position = |errors: &Errors| Some(errors.position_m);
+    let rotation = |errors: &Errors| errors.rotation_rad;
+    let quantities: [(&str, f64, &dyn Fn(&Errors) -> Option<Numbers>); 2] =
+        [("mm", 1e3, &position), ("deg", 1f64.to_degrees(), &rotation)];
+    let statistics: [(&str, fn(&Numbers) -> f64); 3] = [("mean", |n| n.mean), ("rms", |n| n.rms), ("max", |n| n.max)];
+    for (unit, factor, quantity) in quantities {
+        if pairs.iter().all(|(_, before, after)| quantity(before).is_none() && quantity(after).is_none()) {
+            continue;
+        }
+        for (name, statistic) in statistics {
+            write!(text, "| {name}, {unit} |").ok();
+            for errors in pairs.iter().flat_map(|(_, before, after)| [before, after]) {
+                let number = quantity(errors).map_or("–".to_owned(), |n| significant(statistic(&n) * factor, 4));
+                write!(text, " {number} |").ok();
+            }
+            text += "\n";
+        }
+    }
+    text + "\n"
 }
 
 /// A number with `digits` significant digits.
