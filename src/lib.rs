@@ -16,3 +16,5 @@ pub mod scene;
 pub mod seed;
 pub mod self_collision;
 pub mod session;
+#[cfg(feature = "viewer")]
+pub mod viewing;

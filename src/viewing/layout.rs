@@ -1,0 +1,226 @@
+//! The blueprint: which views a run opens on.
+//!
+//! Written with the blueprint archetypes themselves, because the SDK's `Blueprint` type cannot set a view's properties (camera,
+//! legends, bounds). Its messages are the same.
+
+use rerun::EntityPath;
+use rerun::blueprint::components::{
+    ActiveTab, BackgroundKind, ColumnShare, ContainerKind, Corner2D, Eye3DKind, Fps, IncludedContent, PanelState, PlayState,
+    QueryExpression, RootContainer, RowShare, TimelineName, ViewClass, VisualBounds2D,
+};
+use rerun::components::{Name, Position3D, Vector3D};
+use rerun::external::re_log_types::BlueprintActivationCommand;
+use rerun::external::re_sdk_types::blueprint::archetypes::{
+    Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend, TimePanelBlueprint, ViewBlueprint,
+    ViewContents, ViewportBlueprint, VisualBounds2D as VisualBounds,
+};
+use rerun::external::re_sdk_types::datatypes::{Float32, Float64, Range1D, Range2D, Uuid};
+use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
+
+use super::{chart, picture};
+
+const BACKGROUND: [u8; 3] = [20, 22, 28];
+
+/// Which parts of a run there are to see.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Parts {
+    pub(super) swarm: bool,
+    pub(super) measured: bool,
+}
+
+impl Parts {
+    /// What the run of a command shows; all of it for a command that is not known here.
+    pub(super) fn of(command: &str) -> Parts {
+        Parts { swarm: !matches!(command, "measure" | "identify"), measured: command != "design" }
+    }
+}
+
+/// How the scene is looked at.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Camera {
+    pub(super) position: [f32; 3],
+    pub(super) target: [f32; 3],
+    pub(super) up: [f32; 3],
+}
+
+enum Node {
+    View {
+        class: &'static str,
+        name: String,
+        contents: Vec<&'static str>,
+        properties: Vec<(&'static str, Box<dyn AsComponents>)>,
+    },
+    Container {
+        kind: ContainerKind,
+        children: Vec<(f32, Node)>,
+    },
+}
+
+fn view(class: &'static str, name: impl Into<String>, contents: &[&'static str]) -> Node {
+    Node::View { class, name: name.into(), contents: contents.to_vec(), properties: Vec::new() }
+}
+
+fn rows(children: Vec<(f32, Node)>) -> Node {
+    Node::Container { kind: ContainerKind::Vertical, children }
+}
+
+fn columns(children: Vec<(f32, Node)>) -> Node {
+    Node::Container { kind: ContainerKind::Horizontal, children }
+}
+
+fn tabs(children: Vec<Node>) -> Node {
+    Node::Container { kind: ContainerKind::Tabs, children: children.into_iter().map(|child| (1.0, child)).collect() }
+}
+
+impl Node {
+    fn with(mut self, name: &'static str, archetype: impl AsComponents + 'static) -> Node {
+        if let Node::View { properties, .. } = &mut self {
+            properties.push((name, Box::new(archetype)));
+        }
+        self
+    }
+
+    /// Logs the node and what is in it; returns its path and number.
+    fn log(self, stream: &RecordingStream, next: &mut u8) -> RecordingStreamResult<(EntityPath, Uuid)> {
+        *next += 1;
+        let id = Uuid { bytes: [0x6b, 0x69, 0x6e, 0x63, 0x61, 0x6c, 0x40, 0, 0x80, 0, 0, 0, 0, 0, 0, *next] };
+        match self {
+            Node::View { class, name, contents, properties } => {
+                let path = format!("view/{id}");
+                let queries = contents.iter().map(|query| QueryExpression((*query).into()));
+                stream.log(format!("{path}/ViewContents"), &ViewContents::new(queries))?;
+                let blueprint = ViewBlueprint::new(ViewClass(class.into())).with_display_name(Name(name.into()));
+                stream.log(path.as_str(), &blueprint.with_space_origin("/"))?;
+                for (property, archetype) in properties {
+                    stream.log(format!("{path}/{property}"), archetype.as_ref())?;
+                }
+                Ok((path.into(), id))
+            }
+            Node::Container { kind, children } => {
+                let mut shares = Vec::new();
+                let mut contents = Vec::new();
+                for (share, child) in children {
+                    shares.push(Float32(share));
+                    contents.push(child.log(stream, next)?.0.to_string());
+                }
+                let mut container = ContainerBlueprint::new(kind);
+                container = match kind {
+                    ContainerKind::Horizontal => container.with_col_shares(shares.into_iter().map(ColumnShare)),
+                    ContainerKind::Vertical => container.with_row_shares(shares.into_iter().map(RowShare)),
+                    _ => match contents.first() {
+                        Some(first) => container.with_active_tab(ActiveTab(first.as_str().into())),
+                        None => container,
+                    },
+                };
+                let path = format!("container/{id}");
+                let contents = contents.into_iter().map(|content| IncludedContent(content.into()));
+                stream.log(path.as_str(), &container.with_contents(contents))?;
+                Ok((path.into(), id))
+            }
+        }
+    }
+}
+
+fn scene(name: &str, contents: &[&'static str], camera: Camera) -> Node {
+    let eye = EyeControls3D::new()
+        .with_kind(Eye3DKind::Orbital)
+        .with_position(Position3D::from(camera.position))
+        .with_look_target(Position3D::from(camera.target))
+        .with_eye_up(Vector3D::from(camera.up));
+    view("3D", name, contents)
+        .with("EyeControls3D", eye)
+        .with("LineGrid3D", LineGrid3D::new().with_visible(false))
+        .with("Background", Background::new(BackgroundKind::SolidColor).with_color(BACKGROUND))
+}
+
+fn plot(name: &str, contents: &[&'static str], legend: bool) -> Node {
+    let legend = PlotLegend::new().with_visible(legend).with_corner(Corner2D::RightBottom);
+    view("TimeSeries", name, contents).with("PlotLegend", legend)
+}
+
+fn error_chart(name: &str, path: &'static str) -> Node {
+    let [x, y] = chart::BOUNDS;
+    let bounds = VisualBounds2D(Range2D { x_range: Range1D(x), y_range: Range1D(y) });
+    view("2D", name, &[path]).with("VisualBounds2D", VisualBounds::new(bounds))
+}
+
+/// The tree of views.
+fn tree(parts: Parts, camera: Camera) -> Node {
+    let summary = view("TextDocument", "Summary", &["/summary"]);
+    let notes = view("TextLog", "Notes", &["/notes/**"]);
+    let mut cell = vec!["/world/base/**", "/world/cell/**", "/world/arm/**", "/world/arm_line/**", "/world/design/**"];
+    let mut cell_name = "Cell: arm, chosen end points (amber)".to_owned();
+    if parts.measured {
+        cell.push("/world/measured/**");
+        cell_name = "Cell: arm; chosen (amber), measured (green), held out (violet)".to_owned();
+    }
+    let cell = scene(&cell_name, &cell, camera);
+    let swarm = || {
+        let contents = ["/world/base/**", "/world/cell/**", "/world/swarm/**"];
+        scene("Swarm: end points; best set amber, others by fitness", &contents, camera)
+    };
+    let residuals = || {
+        scene(
+            "Residuals: measured minus predicted, before and after",
+            &["/world/base/**", "/world/cell/**", "/world/residuals/**"],
+            camera,
+        )
+    };
+    let indexes = || plot("Indexes of the best set, each as 2/π·atan", &["/swarm/indexes/**"], true);
+    let fitness = || {
+        tabs(vec![
+            plot("Fitness O_C: particles, best", &["/swarm/fitness/**"], false),
+            plot("Evaluations, rejections", &["/swarm/effort/**"], true),
+            plot("ω, c1, c2", &["/swarm/coefficients/**"], true),
+        ])
+    };
+    let errors = || {
+        tabs(vec![
+            error_chart("Position error", "/errors/position/**"),
+            error_chart("Attitude error", "/errors/attitude/**"),
+            plot("Temperatures, °C", &["/temperatures/**"], true),
+        ])
+    };
+    let side = tabs(vec![summary, notes]);
+    match (parts.swarm, parts.measured) {
+        (true, false) => columns(vec![
+            (4.0, rows(vec![(3.0, cell), (2.0, indexes())])),
+            (3.0, rows(vec![(3.0, swarm()), (2.0, fitness())])),
+            (3.0, side),
+        ]),
+        (true, true) => columns(vec![
+            (4.0, rows(vec![(10.0, cell), (5.0, indexes()), (4.0, fitness())])),
+            (4.0, rows(vec![(1.0, residuals()), (1.0, swarm())])),
+            (3.0, rows(vec![(2.0, side), (1.0, errors())])),
+        ]),
+        (false, _) => columns(vec![(4.0, cell), (4.0, residuals()), (3.0, rows(vec![(2.0, side), (1.0, errors())]))]),
+    }
+}
+
+/// Sends the blueprint of a run and makes it the active one.
+pub(super) fn send(
+    stream: &RecordingStream,
+    application: &'static str,
+    parts: Parts,
+    camera: Camera,
+) -> RecordingStreamResult<()> {
+    let (blueprint, storage) = RecordingStreamBuilder::new(application).enabled(true).blueprint().memory()?;
+    blueprint.set_time_sequence("blueprint", 0);
+    let (_, root) = tree(parts, camera).log(&blueprint, &mut 0)?;
+    let viewport =
+        ViewportBlueprint::new().with_root_container(RootContainer(root)).with_auto_layout(false).with_auto_views(false);
+    blueprint.log("viewport", &viewport)?;
+    blueprint.log("blueprint_panel", &PanelBlueprint::new().with_state(PanelState::Hidden))?;
+    blueprint.log("selection_panel", &PanelBlueprint::new().with_state(PanelState::Hidden))?;
+    // Following: the picture is the newest one, live and when a file is opened.
+    let time = TimePanelBlueprint::new()
+        .with_state(PanelState::Collapsed)
+        .with_timeline(TimelineName(picture::EVENTS.into()))
+        .with_play_state(PlayState::Following)
+        .with_fps(Fps(Float64(12.0)));
+    blueprint.log("time_panel", &time)?;
+    let Some(id) = blueprint.store_info().map(|info| info.store_id) else { return Ok(()) };
+    let messages = storage.take();
+    stream.send_blueprint(messages, BlueprintActivationCommand::make_active(id));
+    Ok(())
+}

@@ -1,0 +1,177 @@
+//! The run in words: the markdown document beside the pictures.
+
+use std::fmt::Write as _;
+
+use crate::design::outcome::{DesignOutcome, StopReason, SwarmIteration};
+use crate::identification::outcome::{Errors, Identification, Summary as Numbers};
+use crate::measurement::{Measurement, Role};
+use crate::quality::Indexes;
+use crate::recording::event::Start;
+
+/// What is known of the run so far, newest section first.
+#[derive(Debug, Default)]
+pub(super) struct Summary {
+    head: String,
+    swarm: String,
+    design: String,
+    measured: [usize; 2],
+    session_s: f64,
+    identified: String,
+}
+
+impl Summary {
+    pub(super) fn start(&mut self, name: &str, arm: &str, start: &Start) {
+        self.head = format!("### {name}: {}\narm {arm}, kincal {}\n\n", start.command, start.version);
+    }
+
+    pub(super) fn swarm(&mut self, swarm: &SwarmIteration) {
+        self.swarm = format!(
+            "#### Swarm\niteration {} of {}: O_C = {} after {} evaluations, {} rejections\n\n",
+            swarm.iteration,
+            swarm.iterations,
+            significant(swarm.best.comprehensive, 5),
+            swarm.evaluations,
+            swarm.rejections
+        );
+    }
+
+    pub(super) fn designed(&mut self, design: &DesignOutcome) {
+        self.swarm.clear();
+        let stop = match design.stop {
+            StopReason::IterationLimit => "all iterations made",
+            StopReason::Converged => "converged",
+            StopReason::Drawn => "drawn",
+        };
+        let mut text = format!(
+            "#### Design\n{} configurations by `{}`: {stop}, {} evaluations, {} rejections; rank {}.\n\n\
+             | index | chosen | random, mean | random, range |\n|---|---|---|---|\n",
+            design.configurations.len(),
+            design.method,
+            design.evaluations,
+            design.rejections,
+            design.indexes.rank,
+        );
+        let rows: [(&str, fn(&Indexes) -> f64); 9] = [
+            ("**O_C**", |i| i.comprehensive),
+            ("O1", |i| i.o1),
+            ("O2", |i| i.o2),
+            ("O3", |i| i.o3),
+            ("O4", |i| i.o4),
+            ("O5", |i| i.o5),
+            ("O6", |i| i.o6),
+            ("D, m²", |i| i.dispersion_m2),
+            ("U", |i| i.evenness),
+        ];
+        for (name, of) in rows {
+            let [chosen, mean, min, max] = [&design.indexes, &design.random.mean, &design.random.min, &design.random.max]
+                .map(|indexes| significant(of(indexes), 4));
+            writeln!(text, "| {name} | {chosen} | {mean} | {min} … {max} |").ok();
+        }
+        if !design.dropped_parameters.is_empty() {
+            write!(text, "\nHeld at nominal: {}.\n", design.dropped_parameters.join(", ")).ok();
+        }
+        self.design = text + "\n";
+    }
+
+    pub(super) fn measured(&mut self, measurement: &Measurement) {
+        self.measured[usize::from(measurement.role == Role::HeldOut)] += 1;
+        self.session_s = measurement.time_s;
+    }
+
+    /// `scales` states how long the arrows of the residuals are drawn.
+    pub(super) fn identified(&mut self, identified: &Identification, scales: &[String]) {
+        let mut text = format!(
+            "#### Identified\n**{}** after {} iterations: {}. Rank {} of {} parameters, {} equations, residual scale {}.\n\n",
+            if identified.converged { "converged" } else { "NOT CONVERGED" },
+            identified.iterations,
+            identified.reason.trim_end_matches('.'),
+            identified.rank,
+            identified.parameters.len(),
+            identified.equations,
+            significant(identified.residual_scale, 4),
+        );
+        text += &table(identified);
+        if !scales.is_empty() {
+            text += "Arrows of the residuals:\n\n";
+            for scale in scales {
+                writeln!(text, "- {scale}").ok();
+            }
+            text += "\n";
+        }
+        for note in &identified.notes {
+            writeln!(text, "- {note}").ok();
+        }
+        self.identified = text + "\n";
+    }
+
+    /// The document.
+    pub(super) fn markdown(&self) -> String {
+        let [fit, held_out] = self.measured;
+        let measured = if fit + held_out == 0 {
+            String::new()
+        } else {
+            format!("#### Measured\n{fit} to fit, {held_out} held out; {} min.\n\n", significant(self.session_s / 60.0, 3))
+        };
+        [&self.head, &self.identified, &measured, &self.swarm, &self.design].into_iter().map(String::as_str).collect()
+    }
+}
+
+/// Errors before and after, on held-out configurations first where there are any.
+fn table(identified: &Identification) -> String {
+    let mut pairs: Vec<(&str, &Errors, &Errors)> = Vec::new();
+    if let (Some(before), Some(after)) = (&identified.held_out_nominal, &identified.held_out) {
+        pairs.push(("held out", before, after));
+    }
+    pairs.push(("fitted", &identified.nominal, &identified.fitted));
+    let mut text = "| error |".to_owned();
+    for (name, _, after) in &pairs {
+        write!(text, " {name} ({}), before | after |", after.count).ok();
+    }
+    write!(text, "\n|---|{}\n", "---|---|".repeat(pairs.len())).ok();
+    let position = |errors: &Errors| Some(errors.position_m);
+    let rotation = |errors: &Errors| errors.rotation_rad;
+    let quantities: [(&str, f64, &dyn Fn(&Errors) -> Option<Numbers>); 2] =
+        [("mm", 1e3, &position), ("deg", 1f64.to_degrees(), &rotation)];
+    let statistics: [(&str, fn(&Numbers) -> f64); 3] = [("mean", |n| n.mean), ("rms", |n| n.rms), ("max", |n| n.max)];
+    for (unit, factor, quantity) in quantities {
+        if pairs.iter().all(|(_, before, after)| quantity(before).is_none() && quantity(after).is_none()) {
+            continue;
+        }
+        for (name, statistic) in statistics {
+            write!(text, "| {name}, {unit} |").ok();
+            for errors in pairs.iter().flat_map(|(_, before, after)| [before, after]) {
+                let number = quantity(errors).map_or("–".to_owned(), |n| significant(statistic(&n) * factor, 4));
+                write!(text, " {number} |").ok();
+            }
+            text += "\n";
+        }
+    }
+    text + "\n"
+}
+
+/// A number with `digits` significant digits.
+pub(super) fn significant(value: f64, digits: usize) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    let exponent = libm::floor(libm::log10(value.abs())) as i32;
+    if !(-5..=6).contains(&exponent) {
+        return format!("{value:.*e}", digits.saturating_sub(1));
+    }
+    let decimals = usize::try_from(digits as i32 - 1 - exponent).unwrap_or(0);
+    format!("{value:.decimals$}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_their_significant_digits() {
+        assert_eq!(significant(1234.5678, 3), "1235");
+        assert_eq!(significant(0.012_345, 3), "0.0123");
+        assert_eq!(significant(-2.0, 3), "-2.00");
+        assert_eq!(significant(1e-9, 3), "1.00e-9");
+        assert_eq!(significant(0.0, 3), "0");
+    }
+}
