@@ -6,7 +6,7 @@ use crate::frames::Pose;
 use crate::kinematics::Chain;
 
 /// A nominal arm with everything that is known about it without measuring.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Arm {
     /// Name of the robot.
     pub name: String,
@@ -24,7 +24,7 @@ pub struct Arm {
 }
 
 /// A rigid link.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Link {
     /// Name, and name of its frame in the chain.
     pub name: String,
@@ -46,7 +46,7 @@ pub struct Inertial {
 }
 
 /// A body of the cell that does not move.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Fixture {
     /// Name for messages.
     pub name: String,
@@ -57,7 +57,7 @@ pub struct Fixture {
 }
 
 /// A primitive shape at a pose in its link's frame.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Shape {
     /// `link_from_shape`.
     pub link_from_shape: Pose,

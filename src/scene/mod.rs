@@ -1,13 +1,31 @@
 //! A scene: the arm, the sensor, the problem, and apart from them what is injected and hidden.
 
+mod convert;
+mod error;
+pub mod file;
+mod reader;
+#[cfg(test)]
+mod tests;
+
+#[allow(unused_imports)]
+pub(crate) use convert::{inertia_problem, rotation_from_rpy};
+pub use error::{Problem, SceneError};
+pub use reader::{SceneFile, parse, parse_injected, read};
+
 use crate::arm::Arm;
 use crate::measurement::Sensor;
 
 /// Everything but the truth: what the analyser may know. This, and only this, goes into a recording.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// Name; the stem of output files.
     pub name: String,
+    /// What the scene is for.
+    pub description: String,
+    /// Where the arm's numbers come from; belongs into every report.
+    pub arm_note: String,
+    /// What the sensor is.
+    pub sensor_name: String,
     /// Public seed: of the design, the held-out configurations and the order of measuring.
     pub seed: u64,
     /// Nominal arm and cell.
@@ -103,7 +121,7 @@ pub struct Injected {
     pub length_error_m: f64,
     /// Half width of the uniform errors of angle parameters, rad.
     pub angle_error_rad: f64,
-    /// Errors given by name (m or rad), in place of drawn ones.
+    /// Errors given by name (m or rad), in place of drawn ones; in column order.
     pub parameter_errors: Vec<(String, f64)>,
     /// Clearance of joints.
     pub clearances: Vec<JointClearance>,

@@ -1,0 +1,597 @@
+//! From the file's structures to validated types: units become SI here, once.
+
+use nalgebra::{Matrix3, Point3, Quaternion, SymmetricEigen, Translation3, UnitQuaternion, Vector3};
+
+use super::error::{Invalid, suggestion};
+use super::file::*;
+use super::{
+    DesignProblem, EvennessDomain, Injected, JointClearance, Method, Noise, Plan, Scene, Swarm, Thermal, ThermalProfile, Weights,
+};
+use crate::arm::{Arm, Fixture, Geometry, Inertial, Link, Shape};
+use crate::frames::Pose;
+use crate::kinematics::mdh::{self, Frame, SixParameters};
+use crate::kinematics::{Joint, JointKind, Quantity};
+use crate::measurement::Sensor;
+
+type Checked<T> = Result<T, Invalid>;
+
+pub(super) fn metres_from_mm(mm: f64) -> f64 {
+    mm / 1e3
+}
+
+fn metres_from_um(um: f64) -> f64 {
+    um / 1e6
+}
+
+fn point_from_mm(mm: &[f64; 3]) -> Point3<f64> {
+    Point3::from(mm.map(metres_from_mm))
+}
+
+/// The public part of a scene.
+pub(super) fn scene(file: &SceneToml) -> Checked<Scene> {
+    name(&file.name, "name", "names of output files come from it", &|c| {
+        c.is_ascii_lowercase() || c.is_ascii_digit() || matches!(c, '-' | '_')
+    })?;
+    seed(file.seed, "seed")?;
+    let arm = arm(&file.arm)?;
+    let sensor = sensor(&file.sensor)?;
+    let weights = match file.identification.weights {
+        WeightsToml::Noise => Weights::Noise,
+        WeightsToml::Unit => Weights::Unit,
+    };
+    if weights == Weights::Noise {
+        let unweighable = [
+            ("sensor.position_noise_um", sensor.position_sigma_m),
+            ("sensor.attitude_noise_deg", sensor.attitude_sigma_rad.unwrap_or(1.0)),
+        ];
+        if let Some((key, _)) = unweighable.iter().find(|(_, sigma)| *sigma == 0.0) {
+            return Err(Invalid::new(
+                *key,
+                "0, with residuals weighted by their noise",
+                "more than 0 where [identification] weights = \"noise\"",
+                "declare the noise, or set [identification] weights = \"unit\"",
+            ));
+        }
+    }
+    let design = design(&file.design, &arm, &sensor)?;
+    let plan = plan(&file.plan)?;
+    Ok(Scene {
+        name: file.name.clone(),
+        description: file.description.clone(),
+        arm_note: file.arm.note.clone(),
+        sensor_name: file.sensor.name.clone(),
+        seed: file.seed,
+        arm,
+        sensor,
+        design,
+        plan,
+        weights,
+    })
+}
+
+fn name(text: &str, key: &str, why: &str, allowed: &dyn Fn(char) -> bool) -> Checked<()> {
+    if !text.is_empty() && text.len() <= 64 && !text.starts_with('-') && text.chars().all(allowed) {
+        return Ok(());
+    }
+    let upper = if allowed('A') { "A-Z a-z" } else { "a-z" };
+    Err(Invalid::new(
+        key,
+        format!("{text:?}"),
+        format!("1 to 64 of {upper} 0-9 - _, not starting with -"),
+        format!("choose another name: {why}"),
+    ))
+}
+
+fn seed(seed: u64, key: &str) -> Checked<()> {
+    if i64::try_from(seed).is_ok() {
+        return Ok(());
+    }
+    let allowed = format!("0 to {} (TOML has no larger integers)", i64::MAX);
+    Err(Invalid::new(key, seed.to_string(), allowed, "choose a smaller seed"))
+}
+
+fn not_negative(value: f64, key: &str) -> Checked<f64> {
+    if value >= 0.0 {
+        return Ok(value);
+    }
+    Err(Invalid::new(key, value.to_string(), "0 or more", "give the amount without a sign"))
+}
+
+fn positive(value: f64, key: &str) -> Checked<f64> {
+    if value > 0.0 {
+        return Ok(value);
+    }
+    Err(Invalid::new(key, value.to_string(), "more than 0", "give a positive number"))
+}
+
+fn at_least(value: usize, least: usize, key: &str, remedy: &str) -> Checked<usize> {
+    if value >= least {
+        return Ok(value);
+    }
+    Err(Invalid::new(key, value.to_string(), format!("{least} or more"), remedy))
+}
+
+fn arm(file: &ArmToml) -> Checked<Arm> {
+    let Convention::Mdh5 = file.convention;
+    name(&file.name, "arm.name", "the exported URDF's robot is called so", &|c| {
+        c.is_ascii_alphanumeric() || matches!(c, '-' | '_')
+    })?;
+    let Some((tool, jointed)) = file.frame.split_last().filter(|(_, jointed)| !jointed.is_empty()) else {
+        return Err(Invalid::new(
+            "arm.frame",
+            format!("{} frames", file.frame.len()),
+            "one frame per joint and one for the tool: 2 or more",
+            "add [[arm.frame]] sections",
+        ));
+    };
+    let mut joints: Vec<Joint> = Vec::with_capacity(jointed.len());
+    let mut links = vec![link(file.base_link.as_ref(), "base_link".to_owned(), "arm.base_link")?];
+    for (index, frame) in jointed.iter().enumerate() {
+        let key = format!("arm.frame[{}]", index + 1);
+        let Some(joint_toml) = &frame.joint else {
+            return Err(Invalid::new(
+                format!("{key}.joint"),
+                format!("no joint in frame {} of {}", index + 1, file.frame.len()),
+                "every frame but the last, the tool's, has a joint: as many frames as joints and one more",
+                "add joint = { name = …, lower_deg = …, upper_deg = … }, or remove the frame",
+            ));
+        };
+        let joint = joint(joint_toml, &format!("{key}.joint"))?;
+        if let Some(other) = joints.iter().position(|other| other.name == joint.name) {
+            return Err(Invalid::new(
+                format!("{key}.joint.name"),
+                format!("{:?}, which is the name of joint {} too", joint.name, other + 1),
+                "names that are unique",
+                "rename one of them",
+            ));
+        }
+        joints.push(joint);
+        links.push(link(frame.link.as_ref(), format!("link{}", index + 1), &format!("{key}.link"))?);
+    }
+    let last = format!("arm.frame[{}]", file.frame.len());
+    if tool.joint.is_some() {
+        return Err(Invalid::new(
+            format!("{last}.joint"),
+            format!("a joint in the last of {} frames", file.frame.len()),
+            "as many frames as joints and one more: the last is the tool's and has no joint",
+            "add a last [[arm.frame]] without a joint, from the last joint to the tool",
+        ));
+    }
+    if tool.link.is_some() {
+        return Err(Invalid::new(
+            format!("{last}.link"),
+            "a link in the tool's frame",
+            "no link: what is behind the last joint is one body",
+            format!("move it into arm.frame[{}].link, whose frame lies on the last joint's axis", file.frame.len() - 1),
+        ));
+    }
+    let frames: Vec<Frame> = file
+        .frame
+        .iter()
+        .map(|frame| Frame {
+            alpha: frame.alpha_deg.to_radians(),
+            a: metres_from_mm(frame.a_mm),
+            theta: frame.theta_deg.to_radians(),
+            d: metres_from_mm(frame.d_mm),
+            beta: frame.beta_deg.to_radians(),
+        })
+        .collect();
+    let six = |six: &SixToml| SixParameters { xyz: six.xyz_mm.map(metres_from_mm), rpy: six.rpy_deg.map(f64::to_radians) };
+    let chain = mdh::chain(&frames, joints, file.base.as_ref().map(six), file.tool.as_ref().map(six));
+    let mut fixtures: Vec<Fixture> = Vec::with_capacity(file.fixture.len());
+    for (index, fixture) in file.fixture.iter().enumerate() {
+        let key = format!("arm.fixture[{}]", index + 1);
+        if fixtures.iter().any(|other| other.name == fixture.name) {
+            let found = format!("{:?}, which is the name of another fixture too", fixture.name);
+            return Err(Invalid::new(format!("{key}.name"), found, "names that are unique", "rename one of them"));
+        }
+        let may_touch = fixture
+            .may_touch
+            .iter()
+            .enumerate()
+            .map(|(entry, name)| link_index(name, &links, &format!("{key}.may_touch[{}]", entry + 1)))
+            .collect::<Checked<Vec<usize>>>()?;
+        fixtures.push(Fixture { name: fixture.name.clone(), shape: shape(&fixture.shape, &format!("{key}.shape"))?, may_touch });
+    }
+    let mut uncollidable = Vec::with_capacity(file.uncollidable.len());
+    for (index, [first, second]) in file.uncollidable.iter().enumerate() {
+        let key = format!("arm.uncollidable[{}]", index + 1);
+        let pair = (link_index(first, &links, &format!("{key}[1]"))?, link_index(second, &links, &format!("{key}[2]"))?);
+        if pair.0 == pair.1 {
+            return Err(Invalid::new(key, format!("{first:?} twice"), "two different links", "remove the pair"));
+        }
+        uncollidable.push((pair.0.min(pair.1), pair.0.max(pair.1)));
+    }
+    uncollidable.sort_unstable();
+    uncollidable.dedup();
+    Ok(Arm { name: file.name.clone(), chain, links, fixtures, uncollidable, gravity_in_base: Vector3::from(file.gravity_m_s2) })
+}
+
+fn link_index(name: &str, links: &[Link], key: &str) -> Checked<usize> {
+    links.iter().position(|link| link.name == name).ok_or_else(|| {
+        let names: Vec<&str> = links.iter().map(|link| link.name.as_str()).collect();
+        let remedy = suggestion(name, &names).unwrap_or_else(|| "name a link of this arm".to_owned());
+        Invalid::new(key, format!("{name:?}"), names.join(", "), remedy)
+    })
+}
+
+fn joint(file: &JointToml, key: &str) -> Checked<Joint> {
+    name(&file.name, &format!("{key}.name"), "the exported URDF's joint is called so", &|c| {
+        c.is_ascii_alphanumeric() || matches!(c, '-' | '_')
+    })?;
+    let (kind, unit, wrong_unit, limits, wrong_limits) = match file.kind {
+        JointKindToml::Revolute => {
+            (JointKind::Revolute, "deg", "mm", [file.lower_deg, file.upper_deg], [file.lower_mm, file.upper_mm])
+        }
+        JointKindToml::Prismatic => {
+            (JointKind::Prismatic, "mm", "deg", [file.lower_mm, file.upper_mm], [file.lower_deg, file.upper_deg])
+        }
+    };
+    let kind_name = if kind == JointKind::Revolute { "revolute" } else { "prismatic" };
+    let mut values = [0.0; 2];
+    for (value, (side, (limit, wrong))) in
+        values.iter_mut().zip(["lower", "upper"].iter().zip(limits.iter().zip(wrong_limits.iter())))
+    {
+        if wrong.is_some() {
+            return Err(Invalid::new(
+                format!("{key}.{side}_{wrong_unit}"),
+                format!("`{side}_{wrong_unit}` of a {kind_name} joint"),
+                format!("`{side}_{unit}`"),
+                format!("did you mean `{side}_{unit}`? limits of {kind_name} joints are in {unit} here"),
+            ));
+        }
+        *value = limit.ok_or_else(|| {
+            Invalid::new(
+                format!("{key}.{side}_{unit}"),
+                format!("`{side}_{unit}` is missing"),
+                format!("`lower_{unit}` and `upper_{unit}` are required: configurations are drawn between them"),
+                format!("add `{side}_{unit} = …`"),
+            )
+        })?;
+    }
+    let [lower, upper] = values;
+    if lower >= upper {
+        return Err(Invalid::new(
+            format!("{key}.lower_{unit}"),
+            format!("lower limit {lower}, upper limit {upper}"),
+            "a lower limit below the upper one",
+            "exchange or correct the limits",
+        ));
+    }
+    let convert = match kind {
+        JointKind::Revolute => f64::to_radians,
+        JointKind::Prismatic => metres_from_mm,
+    };
+    Ok(Joint { name: file.name.clone(), kind, lower: convert(lower), upper: convert(upper) })
+}
+
+fn link(file: Option<&LinkToml>, name: String, key: &str) -> Checked<Link> {
+    let Some(file) = file else {
+        return Ok(Link { name, inertial: None, shapes: Vec::new() });
+    };
+    let inertial = match (file.mass_kg, &file.centre_of_mass_mm, &file.inertia_kg_m2) {
+        (None, None, None) => None,
+        (Some(mass_kg), Some(centre), Some(inertia_toml)) => Some(Inertial {
+            mass_kg: positive(mass_kg, &format!("{key}.mass_kg"))?,
+            centre_of_mass_in_link: point_from_mm(centre),
+            inertia_in_link: inertia(inertia_toml, &format!("{key}.inertia_kg_m2"))?,
+        }),
+        (mass, centre, inertia) => {
+            let missing =
+                [("mass_kg", mass.is_none()), ("centre_of_mass_mm", centre.is_none()), ("inertia_kg_m2", inertia.is_none())];
+            let missing: Vec<&str> = missing.iter().filter(|(_, missing)| *missing).map(|(name, _)| *name).collect();
+            return Err(Invalid::new(
+                key,
+                format!("`{}` missing", missing.join("` and `")),
+                "mass_kg, centre_of_mass_mm and inertia_kg_m2: all three or none",
+                "add what is missing",
+            ));
+        }
+    };
+    let shapes = file
+        .shapes
+        .iter()
+        .enumerate()
+        .map(|(index, file)| shape(file, &format!("{key}.shapes[{}]", index + 1)))
+        .collect::<Checked<Vec<Shape>>>()?;
+    Ok(Link { name, inertial, shapes })
+}
+
+fn inertia(file: &InertiaToml, key: &str) -> Checked<Matrix3<f64>> {
+    let InertiaToml { xx, yy, zz, xy, xz, yz } = *file;
+    let inertia = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+    match inertia_problem(&inertia) {
+        None => Ok(inertia),
+        Some((found, allowed)) => Err(Invalid::new(
+            key,
+            found,
+            allowed,
+            "check the unit (kg·m², about the centre of mass) and the signs of the products",
+        )),
+    }
+}
+
+/// Why no body has this inertia, as what was found and what is allowed; `None` if one may.
+pub(crate) fn inertia_problem(inertia: &Matrix3<f64>) -> Option<(String, &'static str)> {
+    let mut principal: Vec<f64> = SymmetricEigen::new(*inertia).eigenvalues.iter().copied().collect();
+    principal.sort_by(f64::total_cmp);
+    let text = format!("principal moments {:.4e}, {:.4e}, {:.4e} kg·m²", principal[0], principal[1], principal[2]);
+    if principal[0] <= 0.0 {
+        return Some((text, "a positive definite inertia"));
+    }
+    // A flat body meets the bound with equality, so rounding must pass.
+    if principal[2] > (principal[0] + principal[1]) * (1.0 + 1e-9) {
+        return Some((text, "principal moments of which none exceeds the sum of the other two (no body has others)"));
+    }
+    None
+}
+
+fn shape(file: &ShapeToml, key: &str) -> Checked<Shape> {
+    let segment = |segment: &SegmentToml, kind: &str| -> Checked<(Pose, f64, f64)> {
+        let (from, to) = (point_from_mm(&segment.from_mm), point_from_mm(&segment.to_mm));
+        let radius = metres_from_mm(positive(segment.radius_mm, &format!("{key}.{kind}.radius_mm"))?);
+        let length = (to - from).norm();
+        if length == 0.0 {
+            return Err(Invalid::new(
+                format!("{key}.{kind}.to_mm"),
+                "both ends at one point",
+                "two different ends",
+                "use sphere = { centre_mm = …, radius_mm = … }",
+            ));
+        }
+        let middle = nalgebra::center(&from, &to);
+        Ok((Pose::from_parts(Translation3::from(middle.coords), z_onto(&((to - from) / length))), length / 2.0, radius))
+    };
+    Ok(match file {
+        ShapeToml::Capsule(capsule) => {
+            let (link_from_shape, half_length, radius) = segment(capsule, "capsule")?;
+            Shape { link_from_shape, geometry: Geometry::Capsule { half_length, radius } }
+        }
+        ShapeToml::Cylinder(cylinder) => {
+            let (link_from_shape, half_length, radius) = segment(cylinder, "cylinder")?;
+            Shape { link_from_shape, geometry: Geometry::Cylinder { half_length, radius } }
+        }
+        ShapeToml::Box(cuboid) => {
+            let mut half_extents = [0.0; 3];
+            for (axis, (half, size)) in half_extents.iter_mut().zip(&cuboid.size_mm).enumerate() {
+                *half = metres_from_mm(positive(*size, &format!("{key}.box.size_mm[{}]", axis + 1))?) / 2.0;
+            }
+            let rotation = rotation_from_rpy(cuboid.rpy_deg.map(f64::to_radians));
+            let link_from_shape = Pose::from_parts(Translation3::from(point_from_mm(&cuboid.centre_mm).coords), rotation);
+            Shape { link_from_shape, geometry: Geometry::Box { half_extents } }
+        }
+        ShapeToml::Sphere(sphere) => Shape {
+            link_from_shape: Pose::from_parts(
+                Translation3::from(point_from_mm(&sphere.centre_mm).coords),
+                UnitQuaternion::identity(),
+            ),
+            geometry: Geometry::Sphere {
+                radius: metres_from_mm(positive(sphere.radius_mm, &format!("{key}.sphere.radius_mm"))?),
+            },
+        },
+    })
+}
+
+/// The shortest turn that takes z to the unit vector `direction`.
+fn z_onto(direction: &Vector3<f64>) -> UnitQuaternion<f64> {
+    // Half way between 1 and twice the turn; nothing is left of it when z is turned round, and any axis across z will do.
+    let half_way = Quaternion::new(1.0 + direction.z, -direction.y, direction.x, 0.0);
+    if half_way.norm() < 1e-9 {
+        return UnitQuaternion::new_unchecked(Quaternion::new(0.0, 1.0, 0.0, 0.0));
+    }
+    UnitQuaternion::new_normalize(half_way)
+}
+
+/// `Rot(z, yaw) Rot(y, pitch) Rot(x, roll)` of `[roll, pitch, yaw]`, rad.
+pub(crate) fn rotation_from_rpy([roll, pitch, yaw]: [f64; 3]) -> UnitQuaternion<f64> {
+    // Through libm, so that every machine gets the same bits.
+    let about = |axis: usize, angle: f64| {
+        let (sine, cosine) = libm::sincos(angle / 2.0);
+        let mut vector = Vector3::zeros();
+        vector[axis] = sine;
+        UnitQuaternion::new_unchecked(Quaternion::from_parts(cosine, vector))
+    };
+    about(2, yaw) * about(1, pitch) * about(0, roll)
+}
+
+fn sensor(file: &SensorToml) -> Checked<Sensor> {
+    Ok(Sensor {
+        position_in_base: point_from_mm(&file.position_mm),
+        position_sigma_m: metres_from_um(not_negative(file.position_noise_um, "sensor.position_noise_um")?),
+        position_sigma_per_m: metres_from_um(not_negative(file.position_noise_um_per_m, "sensor.position_noise_um_per_m")?),
+        attitude_sigma_rad: file
+            .attitude_noise_deg
+            .map(|degrees| not_negative(degrees, "sensor.attitude_noise_deg").map(f64::to_radians))
+            .transpose()?,
+        temperature_sigma_k: not_negative(file.temperature_noise_k, "sensor.temperature_noise_k")?,
+    })
+}
+
+fn design(file: &DesignToml, arm: &Arm, sensor: &Sensor) -> Checked<DesignProblem> {
+    let parameters = arm.chain.parameters.len();
+    let (equations, seen) = if sensor.attitude_sigma_rad.is_some() { (6, "a pose") } else { (3, "a position") };
+    let least = parameters.div_ceil(equations);
+    if file.count < least {
+        return Err(Invalid::new(
+            "design.count",
+            file.count.to_string(),
+            format!("{least} or more: {seen} gives {equations} equations and the arm has {parameters} parameters (eq. 30)"),
+            format!("set count = {least} or more"),
+        ));
+    }
+    let swarm = &file.swarm;
+    let [least_inertia, most_inertia] = swarm.inertia;
+    if !(0.0 <= least_inertia && least_inertia <= most_inertia) {
+        return Err(Invalid::new(
+            "design.swarm.inertia",
+            format!("[{least_inertia}, {most_inertia}]"),
+            "[ω_min, ω_max] with 0 ≤ ω_min ≤ ω_max",
+            "put the smaller one first",
+        ));
+    }
+    Ok(DesignProblem {
+        count: file.count,
+        method: match file.method {
+            MethodToml::Pso => Method::Pso,
+            MethodToml::Random => Method::Random,
+        },
+        swarm: Swarm {
+            particles: at_least(swarm.particles, 1, "design.swarm.particles", "give the swarm particles")?,
+            iterations: at_least(swarm.iterations, 1, "design.swarm.iterations", "or use method = \"random\"")?,
+            inertia: swarm.inertia,
+            velocity_factor: positive(swarm.velocity_factor, "design.swarm.velocity_factor")?,
+            tau: positive(swarm.tau, "design.swarm.tau")?,
+        },
+        evenness_domain: match file.evenness_domain {
+            EvennessDomainToml::Reachable => EvennessDomain::Reachable,
+            EvennessDomainToml::BoundingCube => EvennessDomain::BoundingCube,
+        },
+        evenness_step_m: metres_from_mm(positive(file.evenness_step_mm, "design.evenness_step_mm")?),
+        random_sets: at_least(file.random_sets, 1, "design.random_sets", "the chosen set is compared with random ones")?,
+    })
+}
+
+fn plan(file: &PlanToml) -> Checked<Plan> {
+    let reference_temperature_c = file.reference_temperature_c;
+    if reference_temperature_c <= -273.15 {
+        return Err(Invalid::new(
+            "plan.reference_temperature_c",
+            reference_temperature_c.to_string(),
+            "more than -273.15",
+            "temperatures are in °C here",
+        ));
+    }
+    Ok(Plan {
+        held_out_count: at_least(file.held_out_count, 1, "plan.held_out_count", "the reported error comes from these")?,
+        held_out_exact: file.held_out_exact,
+        seconds_per_pose: positive(file.seconds_per_pose, "plan.seconds_per_pose")?,
+        reference_temperature_c,
+    })
+}
+
+/// The hidden part, checked against the arm it is about.
+pub(super) fn injected(file: &InjectedToml, arm: &Arm) -> Checked<Injected> {
+    seed(file.seed, "injected.seed")?;
+    let parameters = &file.parameters;
+    let mut parameter_errors = Vec::with_capacity(parameters.errors.len());
+    for (key, value) in &parameters.errors {
+        parameter_errors.push(parameter_error(key, *value, arm)?);
+    }
+    // In column order, whatever the order of the file.
+    parameter_errors.sort_by_key(|(name, _)| arm.chain.parameters.iter().position(|parameter| parameter.name == *name));
+    let mut clearances: Vec<JointClearance> = Vec::with_capacity(file.clearance.len());
+    for (index, clearance) in file.clearance.iter().enumerate() {
+        let key = format!("injected.clearance[{}]", index + 1);
+        let Some(joint) = arm.chain.joints.iter().position(|joint| joint.name == clearance.joint) else {
+            let names: Vec<&str> = arm.chain.joints.iter().map(|joint| joint.name.as_str()).collect();
+            let remedy = suggestion(&clearance.joint, &names).unwrap_or_else(|| "name a joint of this arm".to_owned());
+            return Err(Invalid::new(format!("{key}.joint"), format!("{:?}", clearance.joint), names.join(", "), remedy));
+        };
+        if clearances.iter().any(|other| other.joint == joint) {
+            let found = format!("{:?} for the second time", clearance.joint);
+            return Err(Invalid::new(format!("{key}.joint"), found, "one [[injected.clearance]] per joint", "merge the two"));
+        }
+        clearances.push(JointClearance {
+            joint,
+            radial_m: metres_from_um(not_negative(clearance.radial_um, &format!("{key}.radial_um"))?),
+            axial_m: metres_from_um(not_negative(clearance.axial_um, &format!("{key}.axial_um"))?),
+            tilt_rad: not_negative(clearance.tilt_urad, &format!("{key}.tilt_urad"))? / 1e6,
+        });
+    }
+    let thermal = file.thermal.as_ref().map(|thermal| self::thermal(thermal, arm)).transpose()?;
+    Ok(Injected {
+        seed: file.seed,
+        length_error_m: metres_from_mm(not_negative(parameters.length_mm, "injected.parameters.length_mm")?),
+        angle_error_rad: not_negative(parameters.angle_deg, "injected.parameters.angle_deg")?.to_radians(),
+        parameter_errors,
+        clearances,
+        thermal,
+        noise: noise(&file.noise)?,
+    })
+}
+
+fn parameter_error(key: &str, value: f64, arm: &Arm) -> Checked<(String, f64)> {
+    let path = format!("injected.parameters.errors.{key}");
+    let unit_of = |quantity| match quantity {
+        Quantity::Length => "mm",
+        Quantity::Angle => "deg",
+    };
+    let names: Vec<String> =
+        arm.chain.parameters.iter().map(|parameter| format!("{}_{}", parameter.name, unit_of(parameter.quantity))).collect();
+    let Some(parameter) = names.iter().position(|name| name == key) else {
+        let all: Vec<&str> = names.iter().map(String::as_str).collect();
+        let remedy = suggestion(key, &all).unwrap_or_else(|| "name a parameter of this arm, with its unit".to_owned());
+        return Err(Invalid::new(path, format!("unknown parameter `{key}`"), all.join(", "), remedy));
+    };
+    let parameter = &arm.chain.parameters[parameter];
+    let value = match parameter.quantity {
+        Quantity::Length => metres_from_mm(value),
+        Quantity::Angle => value.to_radians(),
+    };
+    Ok((parameter.name.clone(), value))
+}
+
+fn thermal(file: &ThermalToml, arm: &Arm) -> Checked<Thermal> {
+    let each = |values: &OneOrEach, key: &str| -> Checked<Vec<f64>> {
+        match values {
+            OneOrEach::One(value) => Ok(vec![*value; arm.links.len()]),
+            OneOrEach::Each(values) if values.len() == arm.links.len() => Ok(values.clone()),
+            OneOrEach::Each(values) => Err(Invalid::new(
+                format!("injected.thermal.{key}"),
+                format!("{} numbers", values.len()),
+                format!("one number, or {}: one per link, base link first", arm.links.len()),
+                "give as many as there are links",
+            )),
+        }
+    };
+    let expansion = each(&file.expansion_um_per_m_per_k, "expansion_um_per_m_per_k")?;
+    for value in &expansion {
+        not_negative(*value, "injected.thermal.expansion_um_per_m_per_k")?;
+    }
+    Ok(Thermal {
+        expansion_per_k: expansion.into_iter().map(|expansion| expansion / 1e6).collect(),
+        rise_k: each(&file.rise_k, "rise_k")?,
+        profile: match file.profile {
+            ThermalProfileToml::Constant => ThermalProfile::Constant,
+            ThermalProfileToml::WarmUp => ThermalProfile::WarmUp,
+            ThermalProfileToml::HeatAndCool => ThermalProfile::HeatAndCool,
+        },
+    })
+}
+
+fn noise(file: &NoiseToml) -> Checked<Noise> {
+    let kind = match file.kind {
+        NoiseKindToml::Declared => "declared",
+        NoiseKindToml::Uniform => "uniform",
+        NoiseKindToml::Off => "off",
+    };
+    let given = [
+        ("factor", file.factor.is_some(), file.kind == NoiseKindToml::Declared),
+        ("position_mm", file.position_mm.is_some(), file.kind == NoiseKindToml::Uniform),
+        ("attitude_deg", file.attitude_deg.is_some(), file.kind == NoiseKindToml::Uniform),
+    ];
+    if let Some((name, ..)) = given.iter().find(|(_, given, fits)| *given && !fits) {
+        return Err(Invalid::new(
+            format!("injected.noise.{name}"),
+            format!("`{name}` with kind = {kind:?}"),
+            "factor with kind = \"declared\"; position_mm and attitude_deg with kind = \"uniform\"",
+            "remove the key or change the kind",
+        ));
+    }
+    let required = |value: Option<f64>, name: &str| {
+        let key = format!("injected.noise.{name}");
+        let value = value.ok_or_else(|| {
+            let allowed = "position_mm and attitude_deg with kind = \"uniform\"";
+            Invalid::new(key.clone(), format!("`{name}` is missing"), allowed, format!("add `{name} = …` (0 is allowed)"))
+        })?;
+        not_negative(value, &key)
+    };
+    Ok(match file.kind {
+        NoiseKindToml::Declared => Noise::Declared { factor: not_negative(file.factor.unwrap_or(1.0), "injected.noise.factor")? },
+        NoiseKindToml::Uniform => Noise::Uniform {
+            position_m: metres_from_mm(required(file.position_mm, "position_mm")?),
+            attitude_rad: required(file.attitude_deg, "attitude_deg")?.to_radians(),
+        },
+        NoiseKindToml::Off => Noise::Off,
+    })
+}

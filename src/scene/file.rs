@@ -1,0 +1,540 @@
+//! The scene file: TOML whose keys carry their units, as it is written by hand.
+//!
+//! These structures are the schema. Unknown keys are refused; every quantity is in the unit that its key ends in, and becomes SI
+//! and radians once, when [`super::parse`] turns them into the validated types of [`super`]. The optional section `[injected]`
+//! holds what is hidden from the analyser.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::de::{self, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// The whole file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneToml {
+    /// Stem of output files: `a`–`z`, `0`–`9`, `-`, `_`.
+    pub name: String,
+    /// What the scene is for, in a sentence.
+    #[serde(default)]
+    pub description: String,
+    /// Public seed, of design and held-out configurations; 0 … 2⁶³−1.
+    pub seed: u64,
+    /// `[arm]`
+    pub arm: ArmToml,
+    /// `[sensor]`
+    pub sensor: SensorToml,
+    /// `[design]`
+    pub design: DesignToml,
+    /// `[identification]`
+    #[serde(default)]
+    pub identification: IdentificationToml,
+    /// `[plan]`
+    pub plan: PlanToml,
+    /// `[injected]`: what the simulated cell hides from the analyser. Absent where the scene is public.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub injected: Option<InjectedToml>,
+}
+
+/// A file that holds nothing but `[injected]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct InjectedOnlyToml {
+    pub(super) injected: InjectedToml,
+}
+
+/// `[arm]`: the nominal arm and its cell.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ArmToml {
+    /// Name of the robot: letters, digits, `-`, `_`.
+    pub name: String,
+    /// How the frames are written.
+    pub convention: Convention,
+    /// Where the numbers come from; printed in every report.
+    #[serde(default)]
+    pub note: String,
+    /// Acceleration of free fall in the base frame, m/s². Default: 9.81 downwards.
+    #[serde(default = "standard_gravity")]
+    pub gravity_m_s2: [f64; 3],
+    /// Pairs of links that are never checked against each other. Neighbours never are.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub uncollidable: Vec<[String; 2]>,
+    /// Six more parameters in front of the first frame: the base link in the chain's base (`world`).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base: Option<SixToml>,
+    /// Six more parameters behind the last frame.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tool: Option<SixToml>,
+    /// What stands still before joint 1; its frame is the one in which frame 1 is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base_link: Option<LinkToml>,
+    /// `[[arm.frame]]`: one per joint, base to tool, then the tool's.
+    pub frame: Vec<FrameToml>,
+    /// `[[arm.fixture]]`: bodies of the cell.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fixture: Vec<FixtureToml>,
+}
+
+fn standard_gravity() -> [f64; 3] {
+    [0.0, 0.0, -9.81]
+}
+
+/// Conventions for frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Convention {
+    /// `Rot(x, alpha) Trans(x, a) Rot(z, theta) Trans(z, d) Rot(y, beta)`; see [`crate::kinematics::mdh`].
+    #[serde(rename = "mdh5")]
+    Mdh5,
+}
+
+/// The six parameters of a frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SixToml {
+    /// Translation, mm.
+    pub xyz_mm: [f64; 3],
+    /// Roll, pitch, yaw: `Rot(z, yaw) Rot(y, pitch) Rot(x, roll)`, degrees.
+    pub rpy_deg: [f64; 3],
+}
+
+/// `[[arm.frame]]`: five parameters, the joint that moves in them, and the link that moves with the joint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrameToml {
+    /// Turn about x, first.
+    pub alpha_deg: f64,
+    /// Shift along x.
+    pub a_mm: f64,
+    /// Turn about z; added to the reading of a revolute joint.
+    pub theta_deg: f64,
+    /// Shift along z; added to the reading of a prismatic joint.
+    pub d_mm: f64,
+    /// Turn about y, last. Default: 0.
+    #[serde(default)]
+    pub beta_deg: f64,
+    /// The joint; absent in the last frame, the tool's, and only there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint: Option<JointToml>,
+    /// The link. Its frame lies on the joint's axis, after the joint's motion and before theta, d and beta: the link runs from
+    /// its origin along z by d, then along x (turned by theta) by the next frame's a. Absent: no mass, no shape.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub link: Option<LinkToml>,
+}
+
+/// A joint. Limits in degrees if it turns, in mm if it slides.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointToml {
+    /// Name, unique.
+    pub name: String,
+    /// Default: revolute.
+    #[serde(default)]
+    pub kind: JointKindToml,
+    /// Smallest reading that may be commanded; revolute only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lower_deg: Option<f64>,
+    /// Largest reading; revolute only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub upper_deg: Option<f64>,
+    /// Smallest reading; prismatic only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lower_mm: Option<f64>,
+    /// Largest reading; prismatic only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub upper_mm: Option<f64>,
+}
+
+/// How a joint moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum JointKindToml {
+    /// Turns about z.
+    #[default]
+    Revolute,
+    /// Slides along z.
+    Prismatic,
+}
+
+/// A link, in its link frame. Mass, centre of mass and inertia: all three or none.
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LinkToml {
+    /// kg.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass_kg: Option<f64>,
+    /// mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub centre_of_mass_mm: Option<[f64; 3]>,
+    /// About the centre of mass, along the axes of the link frame, kg·m².
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inertia_kg_m2: Option<InertiaToml>,
+    /// For collision and drawing.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shapes: Vec<ShapeToml>,
+}
+
+/// Elements of the inertia tensor; products default to 0.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs)]
+pub struct InertiaToml {
+    pub xx: f64,
+    pub yy: f64,
+    pub zz: f64,
+    #[serde(default)]
+    pub xy: f64,
+    #[serde(default)]
+    pub xz: f64,
+    #[serde(default)]
+    pub yz: f64,
+}
+
+/// A shape: a table with one of these keys.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ShapeToml {
+    /// A ball swept along a segment.
+    Capsule(SegmentToml),
+    /// A cylinder.
+    Cylinder(SegmentToml),
+    /// A cuboid.
+    Box(BoxToml),
+    /// A ball.
+    Sphere(SphereToml),
+}
+
+/// A segment with a radius, mm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SegmentToml {
+    /// One end of the axis (a capsule's caps reach beyond it), mm.
+    pub from_mm: [f64; 3],
+    /// The other end, mm.
+    pub to_mm: [f64; 3],
+    /// mm.
+    pub radius_mm: f64,
+}
+
+/// A cuboid, mm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoxToml {
+    /// mm.
+    pub centre_mm: [f64; 3],
+    /// Full edges, mm.
+    pub size_mm: [f64; 3],
+    /// Roll, pitch, yaw, degrees. Default: along the axes of the frame.
+    #[serde(default)]
+    pub rpy_deg: [f64; 3],
+}
+
+/// A ball, mm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SphereToml {
+    /// mm.
+    pub centre_mm: [f64; 3],
+    /// mm.
+    pub radius_mm: f64,
+}
+
+/// `[[arm.fixture]]`: a body of the cell that does not move; its shape is in the chain's base frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FixtureToml {
+    /// Name for messages, unique.
+    pub name: String,
+    /// Links that may touch it: `base_link`, `link1`, … Default: none.
+    #[serde(default)]
+    pub may_touch: Vec<String>,
+    /// The shape.
+    pub shape: ShapeToml,
+}
+
+/// `[sensor]`: what the data sheet declares, one sigma per axis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorToml {
+    /// What it is.
+    pub name: String,
+    /// Where it stands in the base frame, mm.
+    pub position_mm: [f64; 3],
+    /// Position noise at no distance, µm.
+    pub position_noise_um: f64,
+    /// Growth of the position noise with distance, µm per m. Default: 0.
+    #[serde(default)]
+    pub position_noise_um_per_m: f64,
+    /// Attitude noise per axis, degrees. Absent: the sensor sees positions only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attitude_noise_deg: Option<f64>,
+    /// Noise of the temperature sensors on the links, K. Default: 0.
+    #[serde(default)]
+    pub temperature_noise_k: f64,
+}
+
+/// `[design]`: how many configurations are measured and how they are chosen.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DesignToml {
+    /// m: configurations that are measured and fitted; at least what eq. 30 asks for.
+    pub count: usize,
+    /// Default: pso.
+    #[serde(default)]
+    pub method: MethodToml,
+    /// Which points count as workspace in eq. 25. Default: reachable.
+    #[serde(default)]
+    pub evenness_domain: EvennessDomainToml,
+    /// Step of the grid over the workspace, mm. Default: 100.
+    #[serde(default = "evenness_step_mm")]
+    pub evenness_step_mm: f64,
+    /// Random sets that the chosen one is compared with. Default: 30.
+    #[serde(default = "random_sets")]
+    pub random_sets: usize,
+    /// `[design.swarm]`
+    #[serde(default)]
+    pub swarm: SwarmToml,
+}
+
+fn evenness_step_mm() -> f64 {
+    100.0
+}
+
+fn random_sets() -> usize {
+    30
+}
+
+/// How configurations are chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MethodToml {
+    /// Particle swarm on O_C.
+    #[default]
+    Pso,
+    /// Uniform within the limits.
+    Random,
+}
+
+/// Which points count as workspace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EvennessDomainToml {
+    /// What the arm's end reaches.
+    #[default]
+    Reachable,
+    /// The cube around that.
+    BoundingCube,
+}
+
+/// `[design.swarm]`: the particle swarm; the defaults are the paper's Table 5.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SwarmToml {
+    /// N_Swrm. Default: 20.
+    pub particles: usize,
+    /// N_Iter. Default: 200.
+    pub iterations: usize,
+    /// ω_min and ω_max of eq. 37. Default: 0.4 and 0.95.
+    pub inertia: [f64; 2],
+    /// ξ of eq. 36. Default: 0.729.
+    pub velocity_factor: f64,
+    /// τ of eq. 38. Default: 1.
+    pub tau: f64,
+}
+
+impl Default for SwarmToml {
+    fn default() -> Self {
+        SwarmToml { particles: 20, iterations: 200, inertia: [0.4, 0.95], velocity_factor: 0.729, tau: 1.0 }
+    }
+}
+
+/// `[identification]`
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct IdentificationToml {
+    /// Default: noise.
+    pub weights: WeightsToml,
+}
+
+/// How residuals are weighted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum WeightsToml {
+    /// Each over its declared sigma.
+    #[default]
+    Noise,
+    /// Metres and radians alike, as in eq. 6.
+    Unit,
+}
+
+/// `[plan]`: how the measuring is organised.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlanToml {
+    /// Configurations that are measured but not fitted; they carry the reported error.
+    pub held_out_count: usize,
+    /// Whether these are read without noise, as the paper does (eq. 10). Default: no.
+    #[serde(default)]
+    pub held_out_exact: bool,
+    /// From one reading to the next, s. Default: 10.
+    #[serde(default = "seconds_per_pose")]
+    pub seconds_per_pose: f64,
+    /// At which the nominal arm is nominal, °C. Default: 20.
+    #[serde(default = "reference_temperature_c")]
+    pub reference_temperature_c: f64,
+}
+
+fn seconds_per_pose() -> f64 {
+    10.0
+}
+
+fn reference_temperature_c() -> f64 {
+    20.0
+}
+
+/// `[injected]`: the truth. Never in a recording, never seen by the analyser.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InjectedToml {
+    /// Seed of everything that is drawn for the truth, combined with the scene's; 0 … 2⁶³−1.
+    pub seed: u64,
+    /// `[injected.parameters]`; absent: none is wrong.
+    #[serde(default)]
+    pub parameters: ParametersToml,
+    /// `[injected.thermal]`; absent: no link warms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thermal: Option<ThermalToml>,
+    /// `[injected.noise]`; absent: as declared.
+    #[serde(default)]
+    pub noise: NoiseToml,
+    /// `[[injected.clearance]]`
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub clearance: Vec<ClearanceToml>,
+}
+
+/// `[injected.parameters]`: errors of the geometric parameters.
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ParametersToml {
+    /// Half width of the uniform errors of lengths, mm. Default: 0.
+    pub length_mm: f64,
+    /// Half width of the uniform errors of angles, degrees. Default: 0.
+    pub angle_deg: f64,
+    /// Errors given in place of drawn ones: `{ theta3_deg = 0.1, a2_mm = -0.3 }`.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub errors: BTreeMap<String, f64>,
+}
+
+/// `[[injected.clearance]]`: play of one joint's bearing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClearanceToml {
+    /// The joint's name.
+    pub joint: String,
+    /// Radius of the disc in which the joint's centre may lie, µm. Default: 0.
+    #[serde(default)]
+    pub radial_um: f64,
+    /// Half width along the axis, µm. Default: 0.
+    #[serde(default)]
+    pub axial_um: f64,
+    /// Radius of the disc of the tilt, µrad. Default: 0.
+    #[serde(default)]
+    pub tilt_urad: f64,
+}
+
+/// `[injected.thermal]`: links that grow as they warm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ThermalToml {
+    /// Expansion, µm/m/K: one number, or one per link, base link first.
+    pub expansion_um_per_m_per_k: OneOrEach,
+    /// Largest rise over the reference temperature, K: one number, or one per link, base link first.
+    pub rise_k: OneOrEach,
+    /// Course over the session.
+    pub profile: ThermalProfileToml,
+}
+
+/// Course of the temperature.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ThermalProfileToml {
+    /// At its largest rise all the time.
+    Constant,
+    /// Rising all the time.
+    WarmUp,
+    /// Rising, then falling back.
+    HeatAndCool,
+}
+
+/// One number for all links, or one for each.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum OneOrEach {
+    /// The same for all.
+    One(f64),
+    /// Base link first.
+    Each(Vec<f64>),
+}
+
+impl<'de> Deserialize<'de> for OneOrEach {
+    // By hand, because an untagged enum could not say what it expects.
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Seen;
+        impl<'de> Visitor<'de> for Seen {
+            type Value = OneOrEach;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number, or a list with one number per link")
+            }
+
+            fn visit_f64<E: de::Error>(self, value: f64) -> Result<OneOrEach, E> {
+                Ok(OneOrEach::One(value))
+            }
+
+            fn visit_i64<E: de::Error>(self, value: i64) -> Result<OneOrEach, E> {
+                Ok(OneOrEach::One(value as f64))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut entries: A) -> Result<OneOrEach, A::Error> {
+                let mut values = Vec::new();
+                while let Some(value) = entries.next_element()? {
+                    values.push(value);
+                }
+                Ok(OneOrEach::Each(values))
+            }
+        }
+        deserializer.deserialize_any(Seen)
+    }
+}
+
+/// `[injected.noise]`: the noise that the readings really have.
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoiseToml {
+    /// Default: declared.
+    #[serde(default)]
+    pub kind: NoiseKindToml,
+    /// With `declared`: the declared sigmas times this. Default: 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub factor: Option<f64>,
+    /// With `uniform`: half width per axis, mm. Required there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position_mm: Option<f64>,
+    /// With `uniform`: half width per axis, degrees. Required there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attitude_deg: Option<f64>,
+}
+
+/// Kinds of noise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum NoiseKindToml {
+    /// Normal, with the declared sigmas.
+    #[default]
+    Declared,
+    /// Uniform.
+    Uniform,
+    /// None.
+    Off,
+}

@@ -1,0 +1,412 @@
+use std::path::{Path, PathBuf};
+
+use nalgebra::{DMatrix, Point3, Vector3};
+
+use super::*;
+use crate::arm::Geometry;
+use crate::kinematics::Quantity;
+use crate::seed::{Stream, stream};
+
+const ARM8: &str = include_str!("../../scenes/arm8.toml");
+const PAPER: &str = include_str!("../../scenes/paper.toml");
+
+fn shipped() -> [(SceneFile, &'static str); 2] {
+    [("arm8.toml", ARM8), ("paper.toml", PAPER)].map(|(name, text)| match parse(text, name) {
+        Ok(scene) => (scene, text),
+        Err(error) => panic!("{error}"),
+    })
+}
+
+fn message(text: &str) -> String {
+    match parse(text, "cell.toml") {
+        Ok(_) => panic!("accepted"),
+        Err(error) => error.to_string(),
+    }
+}
+
+/// Replaces the `nth` (from 0) line of arm8.toml that contains `old`, in that line, and checks the message: it names the line.
+fn check(old: &str, nth: usize, new: &str, expected: &[&str]) {
+    let line = ARM8.lines().enumerate().filter(|(_, line)| line.contains(old)).nth(nth).expect("the line exists").0;
+    let text: String = ARM8
+        .lines()
+        .enumerate()
+        .map(|(index, text)| if index == line { text.replacen(old, new, 1) + "\n" } else { text.to_owned() + "\n" })
+        .collect();
+    let message = message(&text);
+    let place = format!("cell.toml:{}:", line + 1);
+    for fragment in expected.iter().copied().chain([place.as_str()]) {
+        assert!(message.contains(fragment), "{old:?} -> {new:?}: {fragment:?} is not in\n{message}");
+    }
+}
+
+#[test]
+fn what_is_wrong_is_named_with_line_key_and_remedy() {
+    let cases: &[(&str, usize, &str, &[&str])] = &[
+        // Keys.
+        (
+            "a_mm = 25",
+            0,
+            "a_m = 0.025",
+            &["arm.frame[3].a_m", "unknown key `a_m`", "did you mean `a_mm`? lengths are in mm here"],
+        ),
+        ("alpha_deg = 90", 0, "alpha_rad = 1.57", &["did you mean `alpha_deg`? angles are in degrees here"]),
+        ("description", 0, "descripton", &["unknown key `descripton`", "did you mean `description`?"]),
+        ("held_out_count = 50", 0, "held_out = 50\nheld_out_count = 50", &["plan.held_out", "held_out_count, held_out_exact"]),
+        (
+            "position_noise_um = 15",
+            0,
+            "position_noise_mm = 0.015",
+            &["did you mean `position_noise_um`? small lengths are in µm here"],
+        ),
+        ("radial_um = 30", 1, "radial_mm = 0.03", &["injected.clearance[2].radial_mm", "did you mean `radial_um`?"]),
+        ("xx = 0.1119", 0, "xxx = 0.1119", &["arm.frame[1].link.inertia_kg_m2.xxx", "xx, yy, zz, xy, xz, yz"]),
+        ("capsule", 0, "pill", &["arm.frame[1].link.shapes[1]", "`pill`", "capsule, cylinder, box, sphere"]),
+        ("radius_mm = 65", 0, "radius_mm = 65, height_mm = 3", &["height_mm", "from_mm, to_mm, radius_mm"]),
+        // Types.
+        ("a_mm = 25", 0, "a_mm = \"25\"", &["arm.frame[3].a_mm", "string \"25\"", "a number"]),
+        ("seed = 2019", 0, "seed = -1", &["seed", "a whole number, not negative"]),
+        ("count = 40", 0, "count = 40.5", &["design.count", "a whole number, not negative"]),
+        ("gravity_m_s2 = [0, 0, -9.81]", 0, "gravity_m_s2 = [0, -9.81]", &["arm.gravity_m_s2", "a list of three numbers"]),
+        ("method = \"pso\"", 0, "method = \"psa\"", &["design.method", "`psa`", "pso, random", "did you mean `pso`?"]),
+        (
+            "profile = \"heat-and-cool\"",
+            0,
+            "profile = \"warmup\"",
+            &["constant, warm-up, heat-and-cool", "did you mean `warm-up`?"],
+        ),
+        ("convention = \"mdh5\"", 0, "convention = \"dh\"", &["arm.convention", "`dh`", "mdh5"]),
+        ("rise_k = [3,", 0, "rise_k = [\"3\",", &["injected.thermal.rise_k[1]", "a number"]),
+        ("rise_k = [3, 8,", 0, "rise_k = [3,", &["injected.thermal.rise_k", "8 numbers", "one number, or 9"]),
+        ("profile = \"heat-and-cool\"", 0, "profile = heat", &["TOML"]),
+        ("[sensor]", 0, "[sensor", &["TOML"]),
+        // Values.
+        ("a_mm = 25", 0, "a_mm = nan", &["arm.frame[3].a_mm", "nan", "a finite number"]),
+        ("tau = 1.0", 0, "tau = -inf", &["design.swarm.tau", "-inf", "a finite number"]),
+        ("to_mm = [0, 0, 280]", 0, "to_mm = [0, 0, 1e999]", &["arm.frame[3].link.shapes[1].capsule.to_mm[3]", "a finite number"]),
+        (
+            "lower_deg = -170",
+            1,
+            "lower_deg = 175",
+            &["arm.frame[3].joint.lower_deg", "lower limit 175, upper limit 170", "below"],
+        ),
+        ("lower_deg = -170", 0, "lower_mm = -170", &["did you mean `lower_deg`? limits of revolute joints are in deg here"]),
+        ("lower_deg = -170", 0, "kind = \"prismatic\", lower_deg = -170", &["limits of prismatic joints are in mm here"]),
+        ("lower_deg = -170, ", 0, "", &["arm.frame[1].joint.lower_deg", "`lower_deg` is missing"]),
+        ("joint3", 0, "joint1", &["arm.frame[3].joint.name", "the name of joint 1 too"]),
+        ("count = 40", 0, "count = 7", &["design.count", "7", "8 or more", "45 parameters (eq. 30)"]),
+        ("mass_kg = 10", 0, "mass_kg = -10", &["arm.frame[2].link.mass_kg", "-10", "more than 0"]),
+        ("xx = 0.0471", 0, "xx = -0.0471", &["arm.frame[2].link.inertia_kg_m2", "a positive definite inertia"]),
+        ("xx = 0.0471", 0, "xx = 0.2471", &["arm.frame[2].link.inertia_kg_m2", "none exceeds the sum of the other two"]),
+        ("radius_mm = 65", 0, "radius_mm = 0", &["arm.frame[1].link.shapes[1].capsule.radius_mm", "more than 0"]),
+        ("to_mm = [0, 0, 280]", 0, "to_mm = [0, 0, 0]", &["both ends at one point", "sphere"]),
+        ("position_noise_um = 15", 0, "position_noise_um = -15", &["sensor.position_noise_um", "0 or more"]),
+        ("attitude_noise_deg = 0.003", 0, "attitude_noise_deg = 0", &["sensor.attitude_noise_deg", "weights = \"unit\""]),
+        (
+            "may_touch = [\"base_link\"]",
+            0,
+            "may_touch = [\"base\"]",
+            &["arm.fixture[1].may_touch[1]", "did you mean `base_link`?"],
+        ),
+        ("name = \"floor\"", 0, "name = \"plate\"", &["arm.fixture[2].name", "another fixture"]),
+        ("name = \"arm8\"", 0, "name = \"Arm 8\"", &["name", "\"Arm 8\"", "a-z 0-9 - _"]),
+        ("inertia = [0.4, 0.95]", 0, "inertia = [0.95, 0.4]", &["design.swarm.inertia", "put the smaller one first"]),
+        ("seconds_per_pose = 20", 0, "seconds_per_pose = 0", &["plan.seconds_per_pose", "more than 0"]),
+        // The hidden section.
+        ("joint = \"joint4\"", 0, "joint = \"joint9\"", &["injected.clearance[2].joint", "\"joint9\"", "joint7, joint8"]),
+        ("joint = \"joint4\"", 0, "joint = \"joint2\"", &["injected.clearance[2].joint", "second time"]),
+        ("tilt_urad = 100", 2, "tilt_urad = -1", &["injected.clearance[3].tilt_urad", "0 or more"]),
+        ("length_mm = 1.0", 0, "length_mm = -1.0", &["injected.parameters.length_mm", "0 or more"]),
+        (
+            "angle_deg = 0.2",
+            0,
+            "errors = { theta3_rad = 0.1 }",
+            &["injected.parameters.errors.theta3_rad", "did you mean `theta3_deg`?"],
+        ),
+        ("angle_deg = 0.2", 0, "errors = { theta12_deg = 0.1 }", &["unknown parameter `theta12_deg`", "alpha1_deg, a1_mm"]),
+        ("factor = 1.0", 0, "position_mm = 1.0", &["injected.noise.position_mm", "kind = \"declared\""]),
+        ("kind = \"declared\"", 0, "kind = \"none\"", &["injected.noise.kind", "declared, uniform, off"]),
+    ];
+    for (old, nth, new, expected) in cases {
+        check(old, *nth, new, expected);
+    }
+}
+
+#[test]
+fn what_is_missing_is_named_with_the_line_of_its_table() {
+    let without = |line: &str| ARM8.replacen(&format!("{line}\n"), "", 1);
+    let cases = [
+        ("alpha_deg = -90", "[[arm.frame]]", "arm.frame[2]", "`alpha_deg` is missing"),
+        ("mass_kg = 10", "[arm.frame.link]", "arm.frame[2].link", "`mass_kg` missing"),
+        ("count = 40", "[design]", "design", "`count` is missing"),
+        ("profile = \"heat-and-cool\"", "[injected.thermal]", "injected.thermal", "`profile` is missing"),
+    ];
+    for (line, header, key, found) in cases {
+        let message = message(&without(line));
+        let gap = ARM8.lines().position(|text| text == line).expect("the line exists");
+        let header_line = ARM8.lines().take(gap).enumerate().filter(|(_, text)| *text == header).last().expect("a header").0 + 1;
+        for fragment in [key, found, &format!("cell.toml:{header_line}:")] {
+            assert!(message.contains(fragment), "{line}: {fragment:?} is not in\n{message}");
+        }
+    }
+    let message = message(&ARM8.replacen("seed = 2019", "#", 1));
+    assert!(message.contains("(top level)") && message.contains("`seed` is missing"), "{message}");
+}
+
+#[test]
+fn there_is_one_frame_more_than_there_are_joints() {
+    let last = ARM8.rfind("[[arm.frame]]").expect("frames");
+    let end = last + ARM8[last..].find("# The cell").expect("the cell follows");
+    let tool = &ARM8[last..end];
+    let message_without = message(&(ARM8[..last].to_owned() + &ARM8[end..]));
+    assert!(message_without.contains("a joint in the last of 8 frames"), "{message_without}");
+    let message_twice = message(&(ARM8[..end].to_owned() + tool + &ARM8[end..]));
+    assert!(message_twice.contains("no joint in frame 9 of 10"), "{message_twice}");
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    let error = read(Path::new("scenes/nowhere.toml")).expect_err("there is no such file");
+    assert!(error.to_string().starts_with("scenes/nowhere.toml: "), "{error}");
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml");
+    assert_eq!(read(&path).expect("the shipped scene is valid").scene.name, "arm8");
+}
+
+#[test]
+fn the_public_part_parses_back_to_the_same_scene_and_hides_the_rest() {
+    for (file, text) in shipped() {
+        let public = file.public_toml().expect("it can be written");
+        let back = parse(&public, "public").unwrap_or_else(|error| panic!("{error}\n{public}"));
+        assert_eq!(back.scene, file.scene);
+        // The shortest text that reads back as the same bits: equal texts are equal bits, zeros' signs included.
+        assert_eq!(format!("{:?}", back.scene), format!("{:?}", file.scene));
+        assert_eq!(back.injected, None);
+        assert_eq!(back.public_toml().expect("it can be written"), public);
+        let (_, hidden) = text.split_once("[injected]").expect("the scenes inject");
+        assert!(hidden.contains("seed = 731"));
+        for word in ["injected", "731", "error", "length_mm", "angle_deg", "clearance", "play", "thermal", "expansion", "#"] {
+            assert!(!public.contains(word), "{word:?} is in the public text");
+        }
+        let injected = file.injected_toml().expect("it can be written").expect("the scenes inject");
+        let back = parse_injected(&injected, "truth", &file.scene.arm).unwrap_or_else(|error| panic!("{error}\n{injected}"));
+        assert_eq!(Some(back), file.injected);
+    }
+}
+
+#[test]
+fn overrides_are_validated_and_written() {
+    let [(mut file, _), _] = shipped();
+    file.set_seed(7).expect("allowed");
+    file.set_count(12).expect("allowed");
+    file.set_held_out_count(3).expect("allowed");
+    file.set_method(file::MethodToml::Random).expect("allowed");
+    file.set_weights(file::WeightsToml::Unit).expect("allowed");
+    file.set_injected_seed(99).expect("allowed");
+    file.set("design.swarm.particles", "5").expect("allowed");
+    file.set("arm.frame[3].joint.upper_deg", "100.5").expect("allowed");
+    file.set("injected.clearance[2].radial_um", "0").expect("allowed");
+    file.set("arm.frame[1].link.shapes[1].capsule.to_mm[3]", "240").expect("allowed");
+    assert_eq!((file.scene.seed, file.scene.design.count, file.scene.plan.held_out_count), (7, 12, 3));
+    assert_eq!(file.scene.design.swarm.particles, 5);
+    assert_eq!(file.scene.arm.chain.joints[2].upper, 100.5f64.to_radians());
+    let injected = file.injected.clone().expect("still there");
+    assert_eq!((injected.seed, injected.clearances[1].radial_m), (99, 0.0));
+    let back = parse(&file.public_toml().expect("it can be written"), "public").expect("valid");
+    assert_eq!(back.scene, file.scene);
+
+    let before = file.clone();
+    let refused = [
+        (file.set_count(3), "override design.count = 3: design.count", "8 or more"),
+        (file.set_seed(u64::MAX), "override seed = ", "TOML has no larger integers"),
+        (file.set("design.cuont", "9"), "override design.cuont = 9", "did you mean `count`?"),
+        (file.set("desing.count", "9"), "override desing.count = 9", "no `desing` in this scene"),
+        (file.set("design.method", "pso"), "override design.method = pso", "TOML"),
+        (file.set("design.method", "\"ga\""), "design.method", "pso, random"),
+        (file.set("arm.frame[12].a_mm", "9"), "override arm.frame[12].a_mm = 9", "no `frame[12]`"),
+    ];
+    for (result, origin, fragment) in refused {
+        let message = result.expect_err("refused").to_string();
+        assert!(message.contains(origin) && message.contains(fragment), "{origin}, {fragment}: {message}");
+    }
+    assert_eq!(file.public_toml().expect("it can be written"), before.public_toml().expect("it can be written"));
+
+    let mut public = parse(&file.public_toml().expect("it can be written"), "public").expect("valid");
+    for result in [public.set_injected_seed(1), public.set("injected.seed", "1")] {
+        assert!(result.expect_err("nothing is injected").to_string().contains("a public scene"));
+    }
+}
+
+#[test]
+fn units_become_si_once() {
+    let [(file, _), (paper, _)] = shipped();
+    let scene = &file.scene;
+    assert_eq!(scene.arm.chain.parameters.len(), 45);
+    assert_eq!(scene.arm.chain.parameters[5].nominal, -std::f64::consts::FRAC_PI_2);
+    assert_eq!(scene.arm.chain.parameters[6].nominal, 0.030);
+    assert_eq!(scene.sensor.position_sigma_m, 15e-6);
+    assert_eq!(scene.sensor.position_sigma_per_m, 6e-6);
+    assert_eq!(scene.design.evenness_step_m, 0.1);
+    let injected = file.injected.as_ref().expect("injected");
+    assert_eq!(injected.clearances[0], JointClearance { joint: 1, radial_m: 30e-6, axial_m: 10e-6, tilt_rad: 100e-6 });
+    assert_eq!(injected.length_error_m, 1e-3);
+    let thermal = injected.thermal.as_ref().expect("thermal");
+    assert_eq!((thermal.expansion_per_k[1], thermal.expansion_per_k.len(), thermal.rise_k[2]), (23e-6, 9, 10.0));
+    let uniform = Noise::Uniform { position_m: 0.002, attitude_rad: 0.0 };
+    assert_eq!(paper.injected.as_ref().expect("injected").noise, uniform);
+    assert!((paper.scene.sensor.position_sigma_m - 0.002 / 3f64.sqrt()).abs() < 1e-18);
+    // Shapes: the ends that were given.
+    let shape = &scene.arm.links[8].shapes[1];
+    let Geometry::Capsule { half_length, radius } = shape.geometry else { panic!("a capsule") };
+    let end = shape.link_from_shape * Point3::new(0.0, 0.0, half_length);
+    assert!((end - Point3::new(0.020, -0.085, -0.100)).norm() < 1e-15 && radius == 0.025);
+    // A capsule that runs down is turned right round.
+    let shape = &scene.arm.links[4].shapes[0];
+    let Geometry::Capsule { half_length, .. } = shape.geometry else { panic!("a capsule") };
+    let end = shape.link_from_shape * Point3::new(0.0, 0.0, half_length);
+    assert!((end - Point3::new(0.0, 0.0, -0.130)).norm() < 1e-15);
+}
+
+#[test]
+fn optional_parts_are_read() {
+    let text = ARM8
+        .replacen("[arm.base_link]", "[arm.base]\nxyz_mm = [1, 2, 3]\nrpy_deg = [0, 0, 90]\n\n[arm.base_link]", 1)
+        .replacen("gravity_m_s2 = [0, 0, -9.81]", "uncollidable = [[\"link4\", \"link2\"]]", 1)
+        .replacen("angle_deg = 0.2", "errors = { base_yaw_deg = 1, a2_mm = -0.3, theta3_deg = 0.1 }", 1)
+        .replacen("rise_k = [3, 8, 10, 10, 9, 8, 7, 6, 5]", "rise_k = 10", 1)
+        .replacen("attitude_noise_deg = 0.003", "", 1);
+    let file = parse(&text, "test").unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(file.scene.arm.chain.parameters.len(), 51);
+    assert_eq!(file.scene.arm.uncollidable, [(2, 4)]);
+    assert_eq!(file.scene.arm.gravity_in_base, Vector3::new(0.0, 0.0, -9.81));
+    assert_eq!(file.scene.sensor.attitude_sigma_rad, None);
+    let injected = file.injected.expect("injected");
+    assert_eq!(injected.thermal.expect("thermal").rise_k, [10.0; 9]);
+    let names: Vec<&str> = injected.parameter_errors.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["base_yaw", "a2", "theta3"]);
+    assert_eq!(injected.parameter_errors[1].1, -0.3e-3);
+    // Positions only: three equations each.
+    assert!(message(&text.replacen("count = 40", "count = 16", 1)).contains("17 or more: a position gives 3 equations"));
+}
+
+fn configuration(arm: &Arm, stream: &mut Stream) -> Vec<f64> {
+    arm.chain.joints.iter().map(|joint| stream.uniform(joint.lower, joint.upper)).collect()
+}
+
+#[test]
+fn errors_like_the_papers_move_the_tool_as_far_as_there() {
+    let [_, (paper, _)] = shipped();
+    let arm = &paper.scene.arm;
+    let injected = paper.injected.as_ref().expect("injected");
+    let mut stream = stream(11, "test/scene/before");
+    let nominal = arm.chain.at_nominal();
+    let (mut sum, mut count) = (0.0, 0);
+    for _ in 0..200 {
+        let values: Vec<f64> = (arm.chain.parameters.iter())
+            .map(|parameter| {
+                let half_width = match parameter.quantity {
+                    Quantity::Length => injected.length_error_m,
+                    Quantity::Angle => injected.angle_error_rad,
+                };
+                parameter.nominal + stream.uniform(-half_width, half_width)
+            })
+            .collect();
+        let at = arm.chain.at(&values);
+        for _ in 0..30 {
+            let joints = configuration(arm, &mut stream);
+            sum += (at.forward(&joints).translation.vector - nominal.forward(&joints).translation.vector).norm();
+            count += 1;
+        }
+    }
+    let mean_mm = 1e3 * sum / f64::from(count);
+    println!("mean position error before calibration: {mean_mm:.2} mm");
+    assert!((60.0..80.0).contains(&mean_mm), "{mean_mm} mm");
+}
+
+#[test]
+fn of_45_parameters_36_can_be_identified() {
+    for (file, _) in shipped() {
+        let arm = &file.scene.arm;
+        let at = arm.chain.at_nominal();
+        let mut stream = stream(12, "test/scene/rank");
+        let mut stacked = DMatrix::zeros(600, 45);
+        for row in 0..100 {
+            let (_, jacobian) = at.jacobian(&configuration(arm, &mut stream));
+            stacked.view_mut((6 * row, 0), (6, 45)).copy_from(&jacobian);
+        }
+        let mut singular: Vec<f64> = stacked.singular_values().iter().copied().collect();
+        singular.sort_by(|a, b| b.total_cmp(a));
+        let rank = singular.iter().filter(|value| **value > 1e-9 * singular[0]).count();
+        println!("{}: rank {rank}, σ1 {:.3}, σ36 {:.3e}, σ37 {:.1e}", file.scene.name, singular[0], singular[35], singular[36]);
+        assert_eq!(rank, 36);
+    }
+}
+
+fn segment_distance(a: [Point3<f64>; 2], b: [Point3<f64>; 2]) -> f64 {
+    // Alternating projection onto the two segments converges to the distance of these convex sets.
+    let closest = |segment: &[Point3<f64>; 2], to: &Point3<f64>| {
+        let along = segment[1] - segment[0];
+        let share = ((to - segment[0]).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
+        segment[0] + along * share
+    };
+    let mut on_a = nalgebra::center(&a[0], &a[1]);
+    let mut on_b = closest(&b, &on_a);
+    for _ in 0..50 {
+        on_a = closest(&a, &on_b);
+        on_b = closest(&b, &on_a);
+    }
+    (on_a - on_b).norm()
+}
+
+/// Share of random configurations that collide, with cylinders taken as capsules and of fixtures only the top.
+fn colliding_share(file: &SceneFile) -> (f64, f64) {
+    let arm = &file.scene.arm;
+    let at = arm.chain.at_nominal();
+    let mut stream = stream(13, "test/scene/collisions");
+    let (mut with_links, mut with_floor, draws) = (0, 0, 3000);
+    let names = arm.chain.frame_names();
+    for _ in 0..draws {
+        let frames = at.frames(&configuration(arm, &mut stream));
+        let segments: Vec<Vec<([Point3<f64>; 2], f64)>> = (arm.links.iter())
+            .map(|link| {
+                let frame = names.iter().position(|name| *name == link.name).expect("every link has a frame");
+                (link.shapes.iter())
+                    .map(|shape| {
+                        let (half_length, radius) = match shape.geometry {
+                            Geometry::Capsule { half_length, radius } | Geometry::Cylinder { half_length, radius } => {
+                                (half_length, radius)
+                            }
+                            _ => panic!("the shipped links are capsules and cylinders"),
+                        };
+                        let base_from_shape = frames[frame] * shape.link_from_shape;
+                        ([-half_length, half_length].map(|z| base_from_shape * Point3::new(0.0, 0.0, z)), radius)
+                    })
+                    .collect()
+            })
+            .collect();
+        let collides = |first: usize, second: usize| {
+            segments[first]
+                .iter()
+                .any(|(a, radius_a)| segments[second].iter().any(|(b, radius_b)| segment_distance(*a, *b) < radius_a + radius_b))
+        };
+        let count = segments.len();
+        with_links += i32::from((0..count).any(|first| (first + 2..count).any(|second| collides(first, second))));
+        let low = |(ends, radius): &([Point3<f64>; 2], f64)| ends.iter().any(|end| end.z - radius < -0.030);
+        with_floor += i32::from(!arm.fixtures.is_empty() && segments[1..].iter().flatten().any(low));
+    }
+    (f64::from(with_links) / f64::from(draws), f64::from(with_floor) / f64::from(draws))
+}
+
+#[test]
+fn collisions_bind_in_the_cell_and_hardly_in_the_papers_scene() {
+    let [(arm8, _), (paper, _)] = shipped();
+    let (links, floor) = colliding_share(&arm8);
+    println!("arm8: {links:.3} of random configurations collide with themselves, {floor:.3} with the floor");
+    assert!((0.02..0.5).contains(&links) && (0.05..0.6).contains(&floor));
+    let (links, _) = colliding_share(&paper);
+    println!("paper: {links:.3} of random configurations collide with themselves");
+    assert!(links < 0.2);
+    for file in [arm8, paper] {
+        let name = file.scene.name.clone();
+        let home = vec![0.0; 8];
+        assert!(file.scene.arm.within_limits(&home), "{name}");
+    }
+}
