@@ -4,7 +4,9 @@
 
 pub mod arm;
 pub mod cell;
+pub mod cli;
 pub mod design;
+pub mod experiments;
 pub mod frames;
 pub mod identification;
 pub mod kinematics;
@@ -12,6 +14,7 @@ pub mod measurement;
 pub mod physics;
 pub mod quality;
 pub mod recording;
+pub mod report;
 pub mod scene;
 pub mod seed;
 pub mod self_collision;

@@ -74,7 +74,6 @@ impl World {
             ..IntegrationParameters::default()
         };
         let softness =
-            SpringCoefficients { natural_frequency: STIFFNESS / (std::f64::consts::TAU * time_step_s), damping_ratio: 1.0 };
             SpringCoefficients { natural_frequency: STIFFNESS / (std::f64::consts::TAU * TIME_STEP_S), damping_ratio: 1.0 };
         let root = rapier.bodies.insert(RigidBodyBuilder::fixed());
         let mut builder = Builder { rapier, last: root, count: 0, freedoms: 0, softness };
@@ -100,12 +99,6 @@ impl World {
                 free |= JointAxesMask::LIN_Z;
                 limits.push((JointAxis::LinZ, clearance.axial_m));
             }
-            let tilts = clearance.tilt_rad > 0.0;
-            let no_mass = MassProperties::default();
-            let slide = (!free.is_empty()).then(|| builder.link(free, &limits, if tilts { no_mass } else { mass }));
-            let tilt = tilts.then(|| {
-                let limit = [(JointAxis::AngX, clearance.tilt_rad)];
-                let first = builder.link(JointAxesMask::ANG_X, &limit, no_mass);
             let slide = (!free.is_empty()).then(|| builder.link(free, &limits, if leans { no_mass } else { mass }));
             let lean = leans.then(|| {
                 tilt = Some(builder.freedoms);

@@ -169,3 +169,40 @@ pub fn number(value: f64) -> String {
         format!("{value:.*}", usize::try_from((4 - before).clamp(0, 6)).unwrap_or(0))
     }
 }
+
+/// Table 4 of the paper beside ours.
+#[must_use]
+pub fn count_error(rows: &[crate::experiments::count_error::Row]) -> String {
+    use crate::experiments::count_error::Mean;
+    let interval = |mean: &Mean, factor: f64| {
+        let [low, high] = mean.interval95;
+        vec![number(mean.mean * factor), format!("{} … {}", number(low * factor), number(high * factor))]
+    };
+    let degrees = 180.0 / std::f64::consts::PI;
+    let cells = rows
+        .iter()
+        .map(|row| {
+            let mut cells = vec![row.count.to_string(), number(row.nominal_position_m.mean * 1e3), number(row.paper_position_m * 1e3)];
+            cells.extend(interval(&row.position_m, 1e3));
+            cells.push(number(row.paper_attitude_rad * degrees));
+            cells.extend(interval(&row.attitude_rad, degrees));
+            cells.push(format!("{}/{}", row.trials - row.not_converged, row.trials));
+            cells
+        })
+        .collect();
+    let header = [
+        "m",
+        "before (mm)",
+        "paper (mm)",
+        "ours (mm)",
+        "95 % of the mean",
+        "paper (°)",
+        "ours (°)",
+        "95 % of the mean",
+        "converged",
+    ];
+    format!(
+        "Held-out error against the number of configurations m (Chen et al. 2019, Table 4); random configurations.\n{}",
+        table(&header, cells)
+    )
+}

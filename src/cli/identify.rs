@@ -1,0 +1,209 @@
+//! `kincal identify`: parameters from a recording or a table.
+
+use std::path::Path;
+
+use anyhow::{Context, bail, ensure};
+use serde_json::Value;
+
+use super::Outcome;
+use super::arguments::{Global, IdentifyOptions};
+use super::output::{self, Audience};
+use crate::arm::Arm;
+use crate::identification::alignment::align;
+use crate::identification::identify;
+use crate::kinematics::urdf;
+use crate::measurement::{Measurement, Role, Sensor, table};
+use crate::recording::event::{Event, Listener};
+use crate::recording::truth_file::write_whole;
+use crate::scene::{self, SceneFile, Weights};
+use crate::{recording, report, session};
+
+pub(crate) fn command(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outcome> {
+    if is_recording(&options.input) { from_recording(global, options) } else { from_table(global, options) }
+}
+
+fn from_recording(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outcome> {
+    ensure!(
+        options.robot.is_none(),
+        "--robot {}: a recording carries its own nominal arm; give --robot with a table (.csv) only",
+        options.robot.as_deref().unwrap_or(Path::new("")).display()
+    );
+    let (file, measurements) = recorded(global, &options.input, options.partial)?;
+    let scene = &file.scene;
+    let measurements = with_evaluation(measurements, options, scene.arm.joint_count())?;
+
+    let stem = input_stem(&options.input, "-identified");
+    let mut audience = Audience::open(global, &scene.arm, Some(&stem), &stem)?;
+    session::start("identify", &file.public_toml()?, &mut audience)?;
+    for measurement in &measurements {
+        audience.take(&Event::Measured(measurement.clone()))?;
+    }
+    let identification = session::identify_and_tell(scene, &measurements, &mut audience)?;
+    let recording = audience.finish()?;
+    conclude(global, options, &scene.arm, &identification, recording.as_deref(), &stem)
+}
+
+fn from_table(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outcome> {
+    let Some(robot) = &options.robot else {
+        bail!("{} is a table: give its nominal robot with --robot FILE (a URDF or a scene)", options.input.display());
+    };
+    for (name, value) in [("--position-noise-um", options.position_noise_um), ("--attitude-noise-deg", options.attitude_noise_deg)] {
+        ensure!(value.is_finite() && value > 0.0, "{name} {value}: a positive number is needed");
+    }
+    let nominal = robot_of(robot, options)?;
+    let measurements = measurements_of(&options.input, nominal.joint_count(), global)?;
+    let measurements = with_evaluation(measurements, options, nominal.joint_count())?;
+    let attitude = measurements.iter().all(|measurement| measurement.attitude_xyzw.is_some());
+    let sensor = Sensor {
+        position_in_base: nalgebra::Point3::origin(),
+        position_sigma_m: options.position_noise_um * 1e-6,
+        position_sigma_per_m: 0.0,
+        attitude_sigma_rad: attitude.then_some(options.attitude_noise_deg.to_radians()),
+        temperature_sigma_k: 0.0,
+    };
+    let fit: Vec<&Measurement> = measurements.iter().filter(|measurement| measurement.role == Role::Fit).collect();
+    let arm = align(&nominal, &sensor, &fit).with_context(|| options.input.display().to_string())?;
+    let identification = identify(&arm, &sensor, Weights::Noise, &measurements)?;
+    let stem = input_stem(&options.input, "-identified");
+    let mut identification = identification;
+    identification.notes.push(
+        "nominal means: the measurement frame and the target fitted, the robot as its file says; no recording is written for a table"
+            .to_owned(),
+    );
+    std::fs::create_dir_all(&global.out).with_context(|| format!("creating {}", global.out.display()))?;
+    conclude(global, options, &arm, &identification, None, &stem)
+}
+
+fn conclude(
+    global: &Global,
+    options: &IdentifyOptions,
+    arm: &Arm,
+    identification: &crate::identification::outcome::Identification,
+    recording: Option<&Path>,
+    stem: &str,
+) -> anyhow::Result<Outcome> {
+    let values: Vec<f64> = identification.parameters.iter().map(|parameter| parameter.identified).collect();
+    let path = global.out.join(format!("{stem}.urdf"));
+    let text = urdf::export_with(arm, &values)?;
+    write_whole(&path, text.as_bytes()).with_context(|| format!("writing {}", path.display()))?;
+    output::show(global, &report::identification(identification))?;
+    if options.parameters {
+        output::show(global, &report::combinations(identification))?;
+    }
+    if let Some(recording) = recording {
+        output::show(global, &format!("Recording   {}", recording.display()))?;
+    }
+    output::show(global, &format!("Calibrated  {}", path.display()))?;
+    let mut object = serde_json::to_value(identification)?;
+    if let Value::Object(map) = &mut object {
+        map.insert("recording".to_owned(), serde_json::to_value(recording)?);
+        map.insert("calibrated_urdf".to_owned(), serde_json::to_value(&path)?);
+    }
+    output::show_json(global, &object)?;
+    Ok(if identification.converged { Outcome::Good } else { Outcome::Bad })
+}
+
+/// The scene and the measurements of a recording.
+pub(crate) fn recorded(global: &Global, path: &Path, partial: bool) -> anyhow::Result<(SceneFile, Vec<Measurement>)> {
+    let recording = recording::read::read(path)?;
+    if let Some(cut) = &recording.cut {
+        if !partial {
+            bail!("{cut}; --partial uses what is there");
+        }
+        output::note(global, &format!("note: {cut}"));
+    }
+    if let Some(warning) = &recording.version_warning {
+        output::note(global, &format!("note: {warning}"));
+    }
+    let mut file = scene::parse(&recording.start.scene, &format!("{} (scene)", path.display()))?;
+    if let Some(seed) = global.seed {
+        file.set_seed(seed)?;
+    }
+    let measurements: Vec<Measurement> = recording
+        .events
+        .into_iter()
+        .filter_map(|event| match event {
+            Event::Measured(measurement) => Some(measurement),
+            _ => None,
+        })
+        .collect();
+    ensure!(!measurements.is_empty(), "{} holds no measurements; make some with `kincal measure` or `kincal run`", path.display());
+    Ok((file, measurements))
+}
+
+/// Adds the measurements of `--evaluate` as held-out ones.
+fn with_evaluation(
+    mut measurements: Vec<Measurement>,
+    options: &IdentifyOptions,
+    joint_count: usize,
+) -> anyhow::Result<Vec<Measurement>> {
+    let Some(other) = &options.evaluate else {
+        return Ok(measurements);
+    };
+    let others = if is_recording(other) {
+        let recording = recording::read::read(other)?;
+        if let Some(cut) = recording.cut.filter(|_| !options.partial) {
+            bail!("{cut}; --partial uses what is there");
+        }
+        let measured = recording.events.into_iter().filter_map(|event| match event {
+            Event::Measured(measurement) => Some(measurement),
+            _ => None,
+        });
+        measured.collect()
+    } else {
+        table::read(other)?.measurements
+    };
+    ensure!(!others.is_empty(), "{} holds no measurements", other.display());
+    check_joints(other, &others, joint_count)?;
+    // What is evaluated is only the other file: its rows are held out whatever they were for.
+    measurements.retain(|measurement| measurement.role == Role::Fit);
+    let (first_index, first_id) = (measurements.len(), measurements.iter().map(|row| row.pose_id + 1).max().unwrap_or(0));
+    for (index, row) in measurements.iter_mut().enumerate() {
+        row.index = index;
+    }
+    let last_time = measurements.last().map_or(0.0, |row| row.time_s);
+    measurements.extend(others.into_iter().enumerate().map(|(index, row)| Measurement {
+        index: first_index + index,
+        pose_id: first_id + row.pose_id,
+        role: Role::HeldOut,
+        time_s: last_time + row.time_s,
+        ..row
+    }));
+    Ok(measurements)
+}
+
+fn measurements_of(path: &Path, joint_count: usize, global: &Global) -> anyhow::Result<Vec<Measurement>> {
+    let table = table::read(path)?;
+    check_joints(path, &table.measurements, joint_count)?;
+    if !table.unused_columns.is_empty() {
+        output::note(global, &format!("note: an identification does not use {}", table.unused_columns.join(", ")));
+    }
+    Ok(table.measurements)
+}
+
+fn check_joints(path: &Path, measurements: &[Measurement], joint_count: usize) -> anyhow::Result<()> {
+    let found = measurements.first().map_or(joint_count, |row| row.joints.len());
+    ensure!(
+        found == joint_count,
+        "{} has {found} joint columns, the robot has {joint_count} joints: is it the right robot, and are its links from --base-link \
+         to --tip-link?",
+        path.display()
+    );
+    Ok(())
+}
+
+fn robot_of(path: &Path, options: &IdentifyOptions) -> anyhow::Result<Arm> {
+    if path.extension().is_some_and(|extension| extension == "toml") {
+        return Ok(scene::read(path)?.scene.arm);
+    }
+    Ok(urdf::read(path, options.base_link.as_deref(), options.tip_link.as_deref())?.arm)
+}
+
+pub(crate) fn is_recording(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "mcap")
+}
+
+pub(crate) fn input_stem(path: &Path, suffix: &str) -> String {
+    let stem = path.file_stem().map_or_else(|| "input".to_owned(), |stem| stem.to_string_lossy().into_owned());
+    format!("{stem}{suffix}")
+}

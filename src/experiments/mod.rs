@@ -1,0 +1,3 @@
+//! Experiments that know the truth and the answer: the only place that holds both.
+
+pub mod count_error;
