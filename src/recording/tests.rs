@@ -11,7 +11,7 @@ use super::topic::Topic;
 use super::*;
 use crate::arm::{Arm, Fixture, Geometry, Link, Shape};
 use crate::design::outcome::{DesignOutcome, EvennessDomains, RandomReference, StopReason, SwarmIteration};
-use crate::frames::Pose;
+use crate::frames::{Pose, pose_error};
 use crate::identification::outcome::{Combination, Errors, Identification, ParameterEstimate, Residual, Summary};
 use crate::kinematics::chain::{Joint, JointKind};
 use crate::kinematics::mdh;
@@ -355,6 +355,44 @@ fn a_killed_run_leaves_its_last_chunks_and_the_earlier_recording() {
 }
 
 #[test]
+fn a_process_killed_with_sigkill_leaves_a_readable_file() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut child = std::process::Command::new(std::env::current_exe().unwrap())
+        .args(["--ignored", "--exact", "recording::tests::records_until_it_is_killed"])
+        .env("KINCAL_KILL_TEST", directory.path())
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let partial = directory.path().join("run.partial.mcap");
+    let patience = std::time::Instant::now();
+    while fs::metadata(&partial).map_or(0, |metadata| metadata.len()) < 200_000 {
+        assert!(patience.elapsed().as_secs() < 60, "nothing is written");
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let recording = read(&partial).unwrap();
+    let cut = recording.cut.unwrap();
+    assert!(!cut.damaged && cut.to_string().contains("run.partial.mcap is cut off"), "{cut}");
+    let events = events(&SMALL);
+    assert_same(&recording.events[..26], &events[..26]);
+    assert!(recording.events[26..].iter().all(|event| *event == events[25]));
+}
+
+/// The child process of the test above.
+#[test]
+#[ignore = "never ends by itself"]
+fn records_until_it_is_killed() {
+    let directory = PathBuf::from(std::env::var("KINCAL_KILL_TEST").unwrap());
+    let mut recorder = Recorder::create(&directory, "run", &arm()).unwrap();
+    let events = events(&SMALL);
+    events[..26].iter().for_each(|event| recorder.take(event).unwrap());
+    loop {
+        recorder.take(&events[25]).unwrap();
+    }
+}
+
+#[test]
 fn a_run_that_fails_keeps_all_it_had_and_does_not_look_whole() {
     let directory = tempfile::tempdir().unwrap();
     let events = events(&SMALL);
@@ -556,6 +594,58 @@ fn missing_and_extra_events_are_counted() {
     fs::write(&cut, &bytes[..bytes.len() / 2]).unwrap();
     let comparison = replay(&cut, &events);
     assert!(comparison.identical() && comparison.extra > 0 && !comparison.cut.unwrap().damaged);
+}
+
+#[test]
+fn the_recorded_frames_multiply_to_the_nominal_tool_pose() {
+    use foxglove::messages::{FrameTransforms, PoseInFrame, PosesInFrame, Quaternion, Vector3};
+    use nalgebra::{Translation3, UnitQuaternion};
+    use prost::Message as _;
+
+    let to_pose = |t: Option<Vector3>, q: Option<Quaternion>| {
+        let (t, q) = (t.unwrap(), q.unwrap());
+        let rotation = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(q.w, q.x, q.y, q.z));
+        Pose::from_parts(Translation3::new(t.x, t.y, t.z), rotation)
+    };
+    let six = mdh::SixParameters { xyz: [0.1, 0.2, 0.3], rpy: [0.1, -0.2, 0.3] };
+    let plain = arm();
+    let mut mounted = arm();
+    mounted.chain =
+        mdh::chain(&[mdh::Frame { alpha: 0.4, a: 0.3, ..Default::default() }; 7], mounted.chain.joints, Some(six), None);
+    for (arm, names) in [(plain, vec!["base_link", "link1"]), (mounted, vec!["world", "base_link", "link1"])] {
+        let mut encoder = Encoder::new(&arm);
+        let measured = events(&SMALL).into_iter().filter(|event| matches!(event, Event::Measured(_)));
+        for event in measured {
+            let Event::Measured(measurement) = &event else { panic!() };
+            let expected = arm.chain.at_nominal().forward(&measurement.joints);
+            let messages = encoder.encode(&event).unwrap();
+            let data = |topic| messages.iter().find(|message| message.topic == topic).unwrap().data.as_slice();
+            let transforms = FrameTransforms::decode(data(Topic::Transforms)).unwrap().transforms;
+            assert_eq!(transforms.len(), arm.chain.frame_names().len() - 1);
+            let (mut frame, mut pose) = (names[0].to_owned(), Pose::identity());
+            for (number, transform) in transforms.into_iter().enumerate() {
+                assert_eq!(transform.parent_frame_id, frame);
+                assert!(names.get(number + 1).is_none_or(|name| *name == transform.child_frame_id));
+                pose *= to_pose(transform.translation, transform.rotation);
+                frame = transform.child_frame_id;
+            }
+            assert_eq!(frame, "tool");
+            let nominal = PoseInFrame::decode(data(Topic::PoseNominal)).unwrap();
+            assert_eq!(nominal.frame_id, names[0]);
+            let nominal = nominal.pose.map(|pose| to_pose(pose.position, pose.orientation)).unwrap();
+            assert!(pose_error(&pose, &expected).norm() < 1e-14 && nominal == expected);
+        }
+    }
+    // With the nominal values as identified ones, the identified arm predicts the nominal poses.
+    let (arm, mut events) = (arm(), events(&SMALL));
+    let Some(Event::Identified(identification)) = events.last_mut() else { panic!() };
+    identification.parameters.iter_mut().for_each(|parameter| parameter.identified = parameter.nominal);
+    let mut encoder = Encoder::new(&arm);
+    let messages: Vec<_> = events.iter().flat_map(|event| encoder.encode(event).unwrap()).collect();
+    let predicted = messages.iter().find(|message| message.topic == Topic::PosesPredicted).unwrap();
+    let nominal = messages.iter().filter(|message| message.topic == Topic::PoseNominal);
+    let nominal: Vec<_> = nominal.map(|message| PoseInFrame::decode(message.data.as_slice()).unwrap().pose.unwrap()).collect();
+    assert_eq!(PosesInFrame::decode(predicted.data.as_slice()).unwrap().poses, nominal);
 }
 
 /// Checks a value against the part of JSON Schema that the schemas use, and that everything in it is described.
