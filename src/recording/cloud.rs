@@ -106,10 +106,15 @@ pub(super) fn end_points(swarm: &SwarmIteration, timestamp: Timestamp, frame_id:
     cloud(&END_POINT, timestamp, frame_id, data)
 }
 
+/// A cloud of end points without any.
+pub(super) fn no_end_points(timestamp: Timestamp, frame_id: &str) -> PointCloud {
+    cloud(&END_POINT, timestamp, frame_id, Vec::new())
+}
+
 /// The end points of `particles` particles, as [`end_points`] has packed them.
 pub(super) fn unpack_end_points(cloud: &PointCloud, particles: usize) -> Result<Vec<Vec<[f32; 3]>>, String> {
     let (expected, stride) = fields(&END_POINT);
-    if cloud.fields != expected || cloud.point_stride != stride || cloud.data.len() % END_POINT_STRIDE != 0 {
+    if cloud.fields != expected || cloud.point_stride != stride || !cloud.data.len().is_multiple_of(END_POINT_STRIDE) {
         return Err("its points are not packed as end points are".to_owned());
     }
     let word = |point: &[u8], at: usize| [point[at], point[at + 1], point[at + 2], point[at + 3]];

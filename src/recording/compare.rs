@@ -113,7 +113,7 @@ impl Comparer {
         while let Some(recorded) = self.recorded.next() {
             let recorded = recorded?;
             missing += 1;
-            let count = self.count(&recorded.channel.topic);
+            let count = self.count(&recorded.channel.topic, recorded.event);
             self.first_difference.get_or_insert_with(|| Difference {
                 message: recorded.number,
                 topic: recorded.channel.topic.clone(),
@@ -137,7 +137,7 @@ impl Comparer {
     fn compare(&mut self, recomputed: &Message) -> Result<(), ReadError> {
         let Some(recorded) = self.recorded.next().transpose()? else {
             self.extra += 1;
-            let count = self.count(recomputed.topic.name());
+            let count = self.count(recomputed.topic.name(), recomputed.event);
             if self.recorded.cut().is_none() {
                 self.first_difference.get_or_insert_with(|| Difference {
                     message: self.compared,
@@ -152,7 +152,7 @@ impl Comparer {
             return Ok(());
         };
         self.compared += 1;
-        let count = self.count(&recorded.channel.topic);
+        let count = self.count(&recorded.channel.topic, recorded.event);
         if let Some((field, was, is)) = difference(&recorded, recomputed) {
             self.differing += 1;
             self.first_difference.get_or_insert_with(|| Difference {
@@ -168,10 +168,13 @@ impl Comparer {
         Ok(())
     }
 
-    fn count(&mut self, topic: &str) -> u64 {
+    /// The message's number within its topic; the empty clouds of the start do not count, so that a cloud has the number of
+    /// its iteration.
+    fn count(&mut self, topic: &str, event: u32) -> u64 {
         let count = self.counts.entry(topic.to_owned()).or_default();
-        *count += 1;
-        *count - 1
+        let number = *count;
+        *count += u64::from(event > 0);
+        number
     }
 }
 

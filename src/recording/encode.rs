@@ -141,6 +141,13 @@ impl Encoder {
         messages.json(Topic::Run, start)?;
         messages.protobuf(Topic::Shapes, &self.shapes());
         messages.protobuf(Topic::Transforms, &self.transforms(&vec![0.0; self.arm.joint_count()]));
+        // Rerun complains of clouds whose frame it has not been told yet, however late they appear.
+        let time = timestamp(self.now_ns);
+        messages.protobuf(Topic::SwarmEndPoints, &cloud::no_end_points(time, &self.root));
+        messages.protobuf(Topic::BestEndPoints, &cloud::best(std::iter::empty(), time, &self.root));
+        for topic in [Topic::ResidualsBefore, Topic::ResidualsAfter] {
+            messages.protobuf(topic, &cloud::residuals(&[], |residual| &residual.nominal, 0.0, time, &self.root));
+        }
         Ok(())
     }
 

@@ -502,6 +502,8 @@ pub fn read(path: &Path) -> Result<Recording, ReadError> {
                     swarm.end_points = points.map_err(|reason| messages.content_error(&message, reason))?;
                     continue;
                 }
+                // The start tells the cloud's frame.
+                Some(Event::Start(_)) if last == Some(message.event) => continue,
                 _ => Err("it does not follow its iteration".to_owned()),
             },
             // Derived from the events above, or of a version to come.

@@ -11,7 +11,7 @@ use super::topic::Topic;
 use super::*;
 use crate::arm::{Arm, Fixture, Geometry, Link, Shape};
 use crate::design::outcome::{DesignOutcome, EvennessDomains, RandomReference, StopReason, SwarmIteration};
-use crate::frames::Pose;
+use crate::frames::{Pose, pose_error};
 use crate::identification::outcome::{Combination, Errors, Identification, ParameterEstimate, Residual, Summary};
 use crate::kinematics::chain::{Joint, JointKind};
 use crate::kinematics::mdh;
@@ -264,7 +264,7 @@ fn a_truncated_recording_is_readable_up_to_its_last_whole_chunk() {
     let bytes = fs::read(record(directory.path(), &events)).unwrap();
     let path = directory.path().join("cut.mcap");
     let mut counts = std::collections::BTreeSet::new();
-    for length in (0..bytes.len()).step_by(97).chain(bytes.len() - 60..bytes.len()) {
+    for length in (0..bytes.len()).step_by(211).chain(bytes.len() - 60..bytes.len()) {
         fs::write(&path, &bytes[..length]).unwrap();
         match read(&path) {
             Ok(recording) => {
@@ -291,7 +291,7 @@ fn an_altered_byte_is_noticed_wherever_it_is() {
     let bytes = fs::read(record(directory.path(), &events)).unwrap();
     let path = directory.path().join("damaged.mcap");
     let mut altered = bytes.clone();
-    for (number, at) in (0..bytes.len()).step_by(53).chain(bytes.len() - 400..bytes.len()).enumerate() {
+    for (number, at) in (0..bytes.len()).step_by(101).chain(bytes.len() - 400..bytes.len()).enumerate() {
         altered[at] ^= [0x01, 0x80, 0xff, 0x10][number % 4];
         fs::write(&path, &altered).unwrap();
         match read(&path) {
@@ -315,7 +315,7 @@ fn arbitrary_bytes_never_panic() {
     let bytes = fs::read(record(directory.path(), &events(&SMALL))).unwrap();
     let path = directory.path().join("noise.mcap");
     let mut stream = stream(3, "test/recording/noise");
-    for _ in 0..400 {
+    for _ in 0..200 {
         let mut noise = bytes.clone();
         for _ in 0..1 + (stream.uniform(0.0, 1.0) * 40.0) as usize {
             // Half of the changes go to the first kilobytes, where header, schemas and lengths are.
@@ -352,6 +352,44 @@ fn a_killed_run_leaves_its_last_chunks_and_the_earlier_recording() {
     assert_eq!((recording.events.len(), cut.last_time_ns), (12, Some(1_000_000_000)));
     assert_same(&recording.events, &events[..12]);
     assert_eq!(fs::read(directory.path().join("run.mcap")).unwrap(), whole);
+}
+
+#[test]
+fn a_process_killed_with_sigkill_leaves_a_readable_file() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut child = std::process::Command::new(std::env::current_exe().unwrap())
+        .args(["--ignored", "--exact", "recording::tests::records_until_it_is_killed"])
+        .env("KINCAL_KILL_TEST", directory.path())
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let partial = directory.path().join("run.partial.mcap");
+    let patience = std::time::Instant::now();
+    while fs::metadata(&partial).map_or(0, |metadata| metadata.len()) < 200_000 {
+        assert!(patience.elapsed().as_secs() < 60, "nothing is written");
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let recording = read(&partial).unwrap();
+    let cut = recording.cut.unwrap();
+    assert!(!cut.damaged && cut.to_string().contains("run.partial.mcap is cut off"), "{cut}");
+    let events = events(&SMALL);
+    assert_same(&recording.events[..26], &events[..26]);
+    assert!(recording.events[26..].iter().all(|event| *event == events[25]));
+}
+
+/// The child process of the test above.
+#[test]
+#[ignore = "never ends by itself"]
+fn records_until_it_is_killed() {
+    let directory = PathBuf::from(std::env::var("KINCAL_KILL_TEST").unwrap());
+    let mut recorder = Recorder::create(&directory, "run", &arm()).unwrap();
+    let events = events(&SMALL);
+    events[..26].iter().for_each(|event| recorder.take(event).unwrap());
+    loop {
+        recorder.take(&events[25]).unwrap();
+    }
 }
 
 #[test]
@@ -508,7 +546,7 @@ fn a_change_in_the_last_bit_is_found_and_named() {
                     swarm.best.o6 = 0.0
                 }
             },
-            "/design/swarm[0].best.o6: recorded -0.0, recomputed 0.0 (message 4, 0.100 s)",
+            "/design/swarm[0].best.o6: recorded -0.0, recomputed 0.0 (message 8, 0.100 s)",
         ),
         (
             31,
@@ -556,6 +594,58 @@ fn missing_and_extra_events_are_counted() {
     fs::write(&cut, &bytes[..bytes.len() / 2]).unwrap();
     let comparison = replay(&cut, &events);
     assert!(comparison.identical() && comparison.extra > 0 && !comparison.cut.unwrap().damaged);
+}
+
+#[test]
+fn the_recorded_frames_multiply_to_the_nominal_tool_pose() {
+    use foxglove::messages::{FrameTransforms, PoseInFrame, PosesInFrame, Quaternion, Vector3};
+    use nalgebra::{Translation3, UnitQuaternion};
+    use prost::Message as _;
+
+    let to_pose = |t: Option<Vector3>, q: Option<Quaternion>| {
+        let (t, q) = (t.unwrap(), q.unwrap());
+        let rotation = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(q.w, q.x, q.y, q.z));
+        Pose::from_parts(Translation3::new(t.x, t.y, t.z), rotation)
+    };
+    let six = mdh::SixParameters { xyz: [0.1, 0.2, 0.3], rpy: [0.1, -0.2, 0.3] };
+    let plain = arm();
+    let mut mounted = arm();
+    mounted.chain =
+        mdh::chain(&[mdh::Frame { alpha: 0.4, a: 0.3, ..Default::default() }; 7], mounted.chain.joints, Some(six), None);
+    for (arm, names) in [(plain, vec!["base_link", "link1"]), (mounted, vec!["world", "base_link", "link1"])] {
+        let mut encoder = Encoder::new(&arm);
+        let measured = events(&SMALL).into_iter().filter(|event| matches!(event, Event::Measured(_)));
+        for event in measured {
+            let Event::Measured(measurement) = &event else { panic!() };
+            let expected = arm.chain.at_nominal().forward(&measurement.joints);
+            let messages = encoder.encode(&event).unwrap();
+            let data = |topic| messages.iter().find(|message| message.topic == topic).unwrap().data.as_slice();
+            let transforms = FrameTransforms::decode(data(Topic::Transforms)).unwrap().transforms;
+            assert_eq!(transforms.len(), arm.chain.frame_names().len() - 1);
+            let (mut frame, mut pose) = (names[0].to_owned(), Pose::identity());
+            for (number, transform) in transforms.into_iter().enumerate() {
+                assert_eq!(transform.parent_frame_id, frame);
+                assert!(names.get(number + 1).is_none_or(|name| *name == transform.child_frame_id));
+                pose *= to_pose(transform.translation, transform.rotation);
+                frame = transform.child_frame_id;
+            }
+            assert_eq!(frame, "tool");
+            let nominal = PoseInFrame::decode(data(Topic::PoseNominal)).unwrap();
+            assert_eq!(nominal.frame_id, names[0]);
+            let nominal = nominal.pose.map(|pose| to_pose(pose.position, pose.orientation)).unwrap();
+            assert!(pose_error(&pose, &expected).norm() < 1e-14 && nominal == expected);
+        }
+    }
+    // With the nominal values as identified ones, the identified arm predicts the nominal poses.
+    let (arm, mut events) = (arm(), events(&SMALL));
+    let Some(Event::Identified(identification)) = events.last_mut() else { panic!() };
+    identification.parameters.iter_mut().for_each(|parameter| parameter.identified = parameter.nominal);
+    let mut encoder = Encoder::new(&arm);
+    let messages: Vec<_> = events.iter().flat_map(|event| encoder.encode(event).unwrap()).collect();
+    let predicted = messages.iter().find(|message| message.topic == Topic::PosesPredicted).unwrap();
+    let nominal = messages.iter().filter(|message| message.topic == Topic::PoseNominal);
+    let nominal: Vec<_> = nominal.map(|message| PoseInFrame::decode(message.data.as_slice()).unwrap().pose.unwrap()).collect();
+    assert_eq!(PosesInFrame::decode(predicted.data.as_slice()).unwrap().poses, nominal);
 }
 
 /// Checks a value against the part of JSON Schema that the schemas use, and that everything in it is described.
