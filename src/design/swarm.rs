@@ -209,3 +209,73 @@ impl Particle {
         self.moved = moved;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SceneFile;
+    use crate::seed::stream;
+
+    fn cell() -> SceneFile {
+        crate::scene::read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml")).unwrap()
+    }
+
+    fn optimise_cell(threads: usize) -> (Optimum, Vec<SwarmIteration>) {
+        let file = cell();
+        let scene = &file.scene;
+        let evaluator = Evaluator::new(&scene.arm, true, scene.design.evenness_domain, scene.design.evenness_step_m);
+        let check = CollisionCheck::new(&scene.arm);
+        let settings = Swarm { particles: 6, iterations: 15, ..scene.design.swarm.clone() };
+        let mut told = Vec::new();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let optimum = pool
+            .install(|| {
+                let watch = |iteration: &SwarmIteration| {
+                    told.push(iteration.clone());
+                    Ok::<(), std::convert::Infallible>(())
+                };
+                optimise(&scene.arm, &evaluator, &check, 10, &settings, &mut stream(5, "test/swarm"), watch)
+            })
+            .unwrap();
+        (optimum, told)
+    }
+
+    #[test]
+    fn the_outcome_does_not_depend_on_the_number_of_threads() {
+        let (one, told_one) = optimise_cell(1);
+        let (two, told_two) = optimise_cell(2);
+        assert_eq!(one.configurations, two.configurations);
+        assert_eq!(told_one, told_two);
+    }
+
+    #[test]
+    fn no_best_ever_collides_or_leaves_the_limits_and_the_swarm_only_gets_better() {
+        let (optimum, told) = optimise_cell(2);
+        let arm = cell().scene.arm;
+        let check = CollisionCheck::new(&arm);
+        let mut scratch = self_collision::Scratch::default();
+        let mut bests = 0;
+        for joints in told.iter().flat_map(|iteration| &iteration.best_configurations) {
+            assert!(arm.within_limits(joints) && !check.collides(joints, &mut scratch), "{joints:?}");
+            bests += 1;
+        }
+        assert!(bests >= 10);
+        assert!(told.windows(2).all(|pair| pair[1].best.comprehensive >= pair[0].best.comprehensive));
+        assert_eq!(optimum.evaluations, 6 * 16);
+        assert!(optimum.rejections > 0, "collisions bind in this cell");
+        let last = told.last().unwrap();
+        assert_eq!((last.rejections, last.evaluations), (optimum.rejections, optimum.evaluations));
+        assert_eq!(last.best.comprehensive, optimum.indexes.comprehensive);
+    }
+
+    #[test]
+    fn inertia_and_factors_follow_equations_37_and_38() {
+        let (_, told) = optimise_cell(1);
+        let last = told.last().unwrap();
+        assert_eq!(last.inertia, 0.4);
+        let before = &told[told.len() - 2];
+        let mean = before.personal_best.iter().sum::<f64>() / before.personal_best.len() as f64;
+        assert!((last.c1 - (4.0 - (-(mean - before.best.comprehensive).abs()).exp())).abs() < 1e-12);
+        assert_eq!(last.c2, 4.0 - last.c1);
+    }
+}

@@ -8,7 +8,7 @@ use crate::arm::Arm;
 use crate::frames::{Pose, pose_error};
 use crate::kinematics::ChainAt;
 use crate::measurement::{Measurement, Sensor};
-use crate::quality::subspace::{Subspace, preference};
+use crate::quality::subspace::{Subspace, late};
 use crate::scene::Weights;
 
 /// Steps after which a fit that has not settled is given up.
@@ -89,17 +89,22 @@ pub fn identify(
     let nominal = arm.chain.nominal();
 
     let start = problem.linearise(&nominal);
-    let subspace = Subspace::reveal(&start.jacobian, &preference(arm));
+    let subspace = Subspace::reveal(&start.jacobian, &late(arm));
     let rank = subspace.rank();
     let equations = problem.equations();
-    if equations < rank || fit.is_empty() || rank == 0 {
-        let structural = Subspace::of_structure(arm, problem.rows_per_pose == 6).rank();
+    let structural = Subspace::of_structure(arm, problem.rows_per_pose == 6).rank();
+    if equations < structural || rank == 0 {
         let needed = structural.div_ceil(problem.rows_per_pose);
         return Err(IdentificationError::TooFew { poses: fit.len(), equations, rank: structural, needed });
     }
 
     let solution = solve(&problem, &subspace.independent, nominal.clone(), start);
     let mut notes = Vec::new();
+    if rank < structural {
+        notes.push(format!(
+            "these configurations tell {rank} combinations apart, this arm has {structural}: measure more different configurations"
+        ));
+    }
     let freedom = equations - rank;
     let noise = problem.noise_scale(&solution.values);
     let scale = if freedom > 0 { (noise.sum_of_squares / freedom as f64).sqrt() } else { 1.0 };
@@ -194,8 +199,7 @@ pub(super) fn fit_some(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement]
     let problem = Problem::new(arm, sensor, Weights::Noise, measurements).ok()?;
     let nominal = arm.chain.nominal();
     let start = problem.linearise(&nominal);
-    let order: Vec<usize> = (0..free.len()).collect();
-    let seen = Subspace::reveal(&start.jacobian.select_columns(free), &order);
+    let seen = Subspace::reveal(&start.jacobian.select_columns(free), &vec![false; free.len()]);
     let columns: Vec<usize> = seen.independent.iter().map(|position| free[*position]).collect();
     let solution = solve(&problem, &columns, nominal, start);
     solution.converged.then_some(solution.values)
@@ -503,3 +507,6 @@ fn expression(arm: &Arm, subspace: &Subspace, position: usize) -> String {
     }
     text
 }
+
+#[cfg(test)]
+mod tests;

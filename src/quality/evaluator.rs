@@ -150,3 +150,62 @@ pub fn comprehensive(dispersion: f64, evenness: f64, o: [f64; 3]) -> f64 {
     let sum = libm::atan(dispersion) + libm::atan(evenness) + o.iter().map(|index| libm::atan(*index)).sum::<f64>();
     std::f64::consts::FRAC_2_PI * sum
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SceneFile;
+    use crate::seed::stream;
+
+    fn paper() -> SceneFile {
+        crate::scene::read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/paper.toml")).unwrap()
+    }
+
+    fn random_set(arm: &Arm, count: usize, label: &str) -> Vec<f64> {
+        let mut stream = stream(1, label);
+        (0..count).flat_map(|_| &arm.chain.joints).map(|joint| stream.uniform(joint.lower, joint.upper)).collect()
+    }
+
+    #[test]
+    fn indexes_are_those_of_the_singular_values_of_the_stacked_jacobian() {
+        let arm = paper().scene.arm;
+        for attitude in [true, false] {
+            let evaluator = Evaluator::new(&arm, attitude, EvennessDomain::Reachable, 0.1);
+            let rank = evaluator.subspace().rank();
+            assert_eq!(rank, if attitude { 36 } else { 33 });
+            let set = random_set(&arm, 40, "test/evaluator");
+            let ours = evaluator.evaluate(&set, &mut Scratch::default());
+            let per_pose = if attitude { 6 } else { 3 };
+            let mut stacked = DMatrix::zeros(per_pose * 40, 45);
+            let chain = arm.chain.at_nominal();
+            for (pose, joints) in set.chunks_exact(8).enumerate() {
+                let (_, jacobian) = chain.jacobian(joints);
+                stacked.rows_mut(per_pose * pose, per_pose).copy_from(&jacobian.rows(0, per_pose));
+            }
+            let mut values: Vec<f64> = stacked.singular_values().iter().copied().collect();
+            values.sort_by(|a, b| b.total_cmp(a));
+            assert!(values[rank - 1] > 1e-3 && values[rank] < 1e-13, "no gap at {rank}");
+            let expected = observability(&values[..rank]);
+            for (ours, expected) in [
+                (ours.o1, expected.o1),
+                (ours.o2, expected.o2),
+                (ours.o3, expected.o3),
+                (ours.o4, expected.o4),
+                (ours.o5, expected.o5),
+                (ours.o6, expected.o6),
+            ] {
+                assert!((ours - expected).abs() < 1e-9 * expected, "{ours} is not {expected}");
+            }
+            let all = evaluator.evaluate_all_parameters(&set, &mut Scratch::default());
+            assert_eq!((all.o1, all.o2, all.o3), (0.0, 0.0, 0.0), "redundant parameters make the plain reading zero");
+        }
+    }
+
+    #[test]
+    fn too_few_configurations_observe_nothing() {
+        let arm = paper().scene.arm;
+        let evaluator = Evaluator::new(&arm, true, EvennessDomain::Reachable, 0.1);
+        let indexes = evaluator.evaluate(&random_set(&arm, 5, "test/few"), &mut Scratch::default());
+        assert_eq!((indexes.rank, indexes.o1, indexes.o3), (30, 0.0, 0.0));
+    }
+}

@@ -10,6 +10,11 @@ use crate::seed::stream;
 const RELATIVE_TOLERANCE: f64 = 1e-9;
 /// Random configurations whose stacked Jacobian tells the structure of an arm.
 const STRUCTURE_SAMPLES: usize = 60;
+/// Share of the largest new part that a column must have to be taken.
+const NEARLY_BEST: f64 = 0.7;
+/// Whether late columns are looked at, and the least new part (of a column's length) that they must have: first the others as far
+/// as they are clearly independent, then the late ones, then both with less and less.
+const PASSES: [(bool, f64); 6] = [(false, 1e-3), (true, 1e-3), (false, 1e-7), (true, 1e-7), (false, 1e-12), (true, 1e-12)];
 
 /// The identifiable subspace of a set of parameters, by choice of independent ones.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,72 +37,64 @@ impl Subspace {
         self.independent.len()
     }
 
-    /// Reveals the subspace of `jacobian` (rows × parameters). Where parameters can stand in for each other, those later in
-    /// `preference` (a permutation of the columns) are dropped.
+    /// Reveals the subspace of `jacobian` (rows × parameters). Of parameters that can stand in for each other, those that `late`
+    /// marks are dropped first.
     ///
-    /// The rank comes from the singular values of the column-scaled Jacobian; the columns are then taken in order of preference as
-    /// long as they are independent of those already taken (Gram–Schmidt, twice), so that the answer is the same every time and
-    /// does not depend on pivots that are nearly equal.
+    /// The rank comes from the singular values of the column-scaled Jacobian. Columns are then taken one by one: of those whose
+    /// part outside the span of the columns taken so far is at least [`NEARLY_BEST`] of the largest such part, the first. That
+    /// keeps the basis well conditioned (a parameter that hardly moves the poses in a direction of its own cannot stand in for one
+    /// that does, least of all when the true errors are large), and the answer does not hang on which of two nearly equal
+    /// columns is larger.
     #[must_use]
-    pub fn reveal(jacobian: &DMatrix<f64>, preference: &[usize]) -> Subspace {
+    pub fn reveal(jacobian: &DMatrix<f64>, late: &[bool]) -> Subspace {
         let columns = jacobian.ncols();
         let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
         let largest = norms.iter().copied().fold(0.0, f64::max);
-        let seen: Vec<bool> = norms.iter().map(|norm| *norm > largest * RELATIVE_TOLERANCE).collect();
-        let mut scaled = jacobian.clone();
-        for (column, norm) in norms.iter().enumerate() {
-            if seen[column] {
-                scaled.column_mut(column).scale_mut(1.0 / norm);
-            } else {
-                scaled.column_mut(column).fill(0.0);
-            }
+        let scale: Vec<f64> =
+            norms.iter().map(|norm| if *norm > largest * RELATIVE_TOLERANCE { 1.0 / norm } else { 0.0 }).collect();
+        // The triangular factor has the same lengths and angles between columns, however many rows there are.
+        let triangle = if jacobian.nrows() > columns { jacobian.clone().qr().unpack_r() } else { jacobian.clone() };
+        let mut rest = triangle.clone();
+        for (mut column, scale) in rest.column_iter_mut().zip(&scale) {
+            column *= *scale;
         }
-        // The triangular factor has the same singular values and is small however many rows there are.
-        let triangle = scaled.clone().qr().r();
-        let mut singular_values: Vec<f64> = triangle.singular_values().iter().copied().collect();
+        let mut singular_values: Vec<f64> = rest.singular_values().iter().copied().collect();
         singular_values.sort_by(|a, b| b.total_cmp(a));
         let threshold = singular_values.first().copied().unwrap_or(0.0) * RELATIVE_TOLERANCE;
         let rank = singular_values.iter().filter(|value| **value > threshold).count();
 
-        let mut basis: Vec<nalgebra::DVector<f64>> = Vec::with_capacity(rank);
         let mut independent = Vec::with_capacity(rank);
-        // A column may be kept only if what it adds is well above rounding; if near-dependences leave the basis short, the
-        // threshold is lowered until the rank is reached.
-        let mut threshold = 1e-6;
-        while independent.len() < rank && threshold > 1e-14 {
-            for &column in preference {
-                if independent.len() == rank {
+        for (class, least) in PASSES {
+            while independent.len() < rank {
+                let candidates = || (0..columns).filter(|column| late[*column] == class);
+                let length = |column: usize| rest.column(column).norm();
+                let longest = candidates().map(length).fold(0.0, f64::max);
+                let Some(chosen) = candidates().find(|column| longest > least && length(*column) >= NEARLY_BEST * longest) else {
                     break;
-                }
-                if !seen[column] || independent.contains(&column) {
-                    continue;
-                }
-                let mut rest = scaled.column(column).into_owned();
-                for _ in 0..2 {
-                    for direction in &basis {
-                        let along = direction.dot(&rest);
-                        rest.axpy(-along, direction, 1.0);
+                };
+                independent.push(chosen);
+                let direction = rest.column(chosen).normalize();
+                for mut column in rest.column_iter_mut() {
+                    // Twice, so that rounding leaves nothing along the direction.
+                    for _ in 0..2 {
+                        let along = direction.dot(&column);
+                        column.axpy(-along, &direction, 1.0);
                     }
                 }
-                let norm = rest.norm();
-                if norm > threshold {
-                    basis.push(rest / norm);
-                    independent.push(column);
-                }
+                rest.column_mut(chosen).fill(0.0);
             }
-            threshold *= 1e-2;
         }
         independent.sort_unstable();
         let dropped: Vec<usize> = (0..columns).filter(|column| !independent.contains(column)).collect();
-        let kept = jacobian.select_columns(&independent);
-        let others = jacobian.select_columns(&dropped);
         let share = if dropped.is_empty() || independent.is_empty() {
             DMatrix::zeros(independent.len(), dropped.len())
         } else {
-            let qr = kept.qr();
-            let mut right = qr.q().transpose() * others;
-            qr.r().solve_upper_triangular_mut(&mut right);
-            right
+            let qr = triangle.select_columns(&independent).qr();
+            let mut right = triangle.select_columns(&dropped);
+            qr.q_tr_mul(&mut right);
+            let mut share = right.rows(0, independent.len()).into_owned();
+            qr.unpack_r().solve_upper_triangular_mut(&mut share);
+            share
         };
         Subspace { independent, dropped, share, singular_values }
     }
@@ -117,17 +114,15 @@ impl Subspace {
             let (_, jacobian) = chain.jacobian(&joints);
             stacked.rows_mut(sample * rows_per_pose, rows_per_pose).copy_from(&jacobian.rows(0, rows_per_pose));
         }
-        Subspace::reveal(&stacked, &preference(arm))
+        Subspace::reveal(&stacked, &late(arm))
     }
 }
 
-/// Order in which parameters are kept: as they stand, but β after all others. Between axes that are not parallel β stands in for
-/// the others and is the one that nobody expects; between parallel axes it is independent and is kept.
+/// Parameters to drop before others: every β. Between axes that are not parallel β stands in for the others and is the one that
+/// nobody expects; between parallel axes it is independent and is kept.
 #[must_use]
-pub fn preference(arm: &Arm) -> Vec<usize> {
-    let is_beta = |column: &usize| arm.chain.parameters[*column].name.starts_with("beta");
-    let columns = 0..arm.chain.parameters.len();
-    columns.clone().filter(|column| !is_beta(column)).chain(columns.filter(is_beta)).collect()
+pub fn late(arm: &Arm) -> Vec<bool> {
+    arm.chain.parameters.iter().map(|parameter| parameter.name.starts_with("beta")).collect()
 }
 
 #[cfg(test)]
@@ -138,11 +133,11 @@ mod tests {
     fn a_redundant_column_is_dropped_and_its_share_told() {
         // Third column = 2 × first − second; the fourth is not seen at all.
         let jacobian = DMatrix::from_row_slice(3, 4, &[1.0, 0.0, 2.0, 0.0, 0.0, 1.0, -1.0, 0.0, 1.0, 1.0, 1.0, 0.0]);
-        let subspace = Subspace::reveal(&jacobian, &[0, 1, 2, 3]);
+        let subspace = Subspace::reveal(&jacobian, &[false; 4]);
         assert_eq!((subspace.rank(), &subspace.independent, &subspace.dropped), (2, &vec![0, 1], &vec![2, 3]));
         assert!((subspace.share.column(0) - nalgebra::dvector![2.0, -1.0]).norm() < 1e-14);
         assert!(subspace.share.column(1).norm() < 1e-14);
-        let other = Subspace::reveal(&jacobian, &[2, 0, 1, 3]);
-        assert_eq!(other.independent, vec![0, 2]);
+        let other = Subspace::reveal(&jacobian, &[true, false, false, false]);
+        assert_eq!(other.independent, vec![1, 2]);
     }
 }

@@ -1,15 +1,21 @@
 //! Results as tables for people. Units are in the headers; machines get the same results as JSON.
 
-use comfy_table::{Cell, CellAlignment, Table, presets};
+use comfy_table::{Cell, CellAlignment, LineStyle, Table, TableStyle};
 
 use crate::design::outcome::{DesignOutcome, StopReason};
 use crate::identification::outcome::{Errors, Identification, Summary};
 use crate::quality::Indexes;
 
+/// Lines above and below, and one under the header.
+const STYLE: TableStyle = TableStyle::new()
+    .top_border(LineStyle::none().fill('─').junction('─'))
+    .header_separator(LineStyle::none().fill('─').junction('─'))
+    .bottom_border(LineStyle::none().fill('─').junction('─'));
+
 /// A table whose first column is text and whose others are numbers.
 fn table(header: &[&str], rows: Vec<Vec<String>>) -> String {
     let mut table = Table::new();
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_header(header.iter().enumerate().map(|(column, name)| cell(column, name)));
+    table.load_style(STYLE).set_header(header.iter().enumerate().map(|(column, name)| cell(column, name)));
     for row in rows {
         table.add_row(row.iter().enumerate().map(|(column, text)| cell(column, text)));
     }

@@ -1,0 +1,99 @@
+//! What the speed marks are about: the comprehensive index, the swarm, and an identification.
+
+use divan::{Bencher, black_box};
+use kincal::cell::measure;
+use kincal::cell::measure::plan;
+use kincal::design::candidates::Sampler;
+use kincal::design::swarm::{optimise, split};
+use kincal::identification::identify;
+use kincal::measurement::Measurement;
+use kincal::quality::evaluator::{Evaluator, Scratch};
+use kincal::recording::event::{Event, Listener, ListenerError};
+use kincal::scene::SceneFile;
+use kincal::seed::stream;
+use kincal::self_collision::{self, CollisionCheck};
+
+fn main() {
+    divan::main();
+}
+
+fn scene(name: &str) -> SceneFile {
+    kincal::scene::read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)).expect("a shipped scene")
+}
+
+fn evaluator(file: &SceneFile) -> Evaluator {
+    let design = &file.scene.design;
+    Evaluator::new(&file.scene.arm, true, design.evenness_domain, design.evenness_step_m)
+}
+
+/// One evaluation of O_C with m = 40, collision checks of all 40 configurations included. Mark: 300 µs on one core.
+#[divan::bench(args = ["arm8.toml", "paper.toml"])]
+fn comprehensive_index(bencher: Bencher, name: &str) {
+    let file = scene(name);
+    let evaluator = evaluator(&file);
+    let check = CollisionCheck::new(&file.scene.arm);
+    let sets = sets(&file, &check, 20);
+    let (mut scratch, mut collision_scratch) = (Scratch::default(), self_collision::Scratch::default());
+    let mut next = sets.iter().cycle();
+    bencher.bench_local(|| {
+        let set = next.next().expect("a cycle has no end");
+        let free = set.chunks_exact(8).filter(|joints| !check.collides(joints, &mut collision_scratch)).count();
+        (free, evaluator.evaluate(black_box(set), &mut scratch))
+    });
+}
+
+/// The collision checks of 40 configurations alone.
+#[divan::bench]
+fn collision_checks(bencher: Bencher) {
+    let file = scene("arm8.toml");
+    let check = CollisionCheck::new(&file.scene.arm);
+    let sets = sets(&file, &check, 1);
+    let mut scratch = self_collision::Scratch::default();
+    bencher.bench_local(|| sets[0].chunks_exact(8).filter(|joints| check.collides(joints, &mut scratch)).count());
+}
+
+/// Table 5's swarm: 20 particles, 200 iterations, m = 40. Mark: 1 s on two cores.
+#[divan::bench(args = ["arm8.toml", "paper.toml"], sample_count = 5)]
+fn swarm(bencher: Bencher, name: &str) {
+    let file = scene(name);
+    let scene = &file.scene;
+    let evaluator = evaluator(&file);
+    let check = CollisionCheck::new(&scene.arm);
+    bencher.bench_local(|| {
+        let mut stream = stream(1, "bench/swarm");
+        let watch = |_: &_| Ok::<(), std::convert::Infallible>(());
+        optimise(&scene.arm, &evaluator, &check, 40, &scene.design.swarm, &mut stream, watch).map(|optimum| optimum.indexes)
+    });
+}
+
+/// Identification of the 8R arm from 50 full poses, the held-out errors included. Mark: 5 ms.
+#[divan::bench(args = ["arm8.toml", "paper.toml"])]
+fn identification(bencher: Bencher, name: &str) {
+    let file = scene(name);
+    let measurements = measurements(&file, 50);
+    let scene = &file.scene;
+    bencher.bench_local(|| identify(&scene.arm, &scene.sensor, scene.weights, black_box(&measurements)));
+}
+
+fn sets(file: &SceneFile, check: &CollisionCheck, count: usize) -> Vec<Vec<f64>> {
+    let mut stream = stream(1, "bench/sets");
+    let mut sampler = Sampler::new(&file.scene.arm, check);
+    (0..count).map(|_| sampler.draw(&mut stream, 40).expect("free configurations")).collect()
+}
+
+fn measurements(file: &SceneFile, count: usize) -> Vec<Measurement> {
+    let check = CollisionCheck::new(&file.scene.arm);
+    let mut sampler = Sampler::new(&file.scene.arm, &check);
+    let chosen = sampler.draw(&mut stream(1, "bench/poses"), count).expect("free configurations");
+    let planned = plan(&file.scene, &split(&chosen, 8), &[]);
+    let injected = file.injected.as_ref().expect("a scene to simulate");
+    measure(&file.scene, injected, &planned, &mut Nobody).expect("measurements").0
+}
+
+struct Nobody;
+
+impl Listener for Nobody {
+    fn take(&mut self, _: &Event) -> Result<(), ListenerError> {
+        Ok(())
+    }
+}
