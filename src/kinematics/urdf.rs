@@ -5,6 +5,7 @@
 
 mod export;
 mod import;
+mod locate;
 pub(crate) mod rpy;
 #[cfg(test)]
 mod tests;

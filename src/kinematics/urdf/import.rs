@@ -6,6 +6,7 @@ use std::path::Path;
 use nalgebra::{Matrix3, Point3, Translation3, Vector3};
 use urdf_rs::JointType;
 
+use super::locate::{Element, Malformed, Outline, line_of, outline};
 use super::rpy::{rotation_from_rpy, z_onto};
 use super::{UrdfError, UrdfProblem};
 use crate::arm::{Arm, Geometry, Inertial, Link, Shape};
@@ -43,13 +44,9 @@ pub fn read(path: &Path, base_link: Option<&str>, tip_link: Option<&str>) -> Res
 /// If the text is no URDF, or the chain has joints other than revolute, continuous, prismatic and fixed, joints that mimic, or
 /// no limits, or if the links do not form a tree from base to tip. The message names the joint or link, the line and a remedy.
 pub fn import(text: &str, origin: &str, base_link: Option<&str>, tip_link: Option<&str>) -> Result<Imported, UrdfError> {
-    let source = Source { text, origin };
-    let robot = urdf_rs::read_from_string(text).map_err(|error| {
-        let found = error.to_string().replace('\n', ", ");
-        let remedy =
-            if text.contains("<xacro:") { "expand the xacro first: xacro robot.xacro > robot.urdf" } else { "correct the file" };
-        source.error(None, "", found, "URDF: <robot> with <link>s and <joint>s", remedy)
-    })?;
+    let outline = outline(text);
+    let source = Source { text, origin, elements: outline.as_ref().map_or(&[], |outline| outline.elements.as_slice()) };
+    let robot = urdf_rs::read_from_string(text).map_err(|error| source.parse_error(&error, &outline))?;
     let tree = Tree::of(&source, &robot)?;
     let (base, path) = tree.path(base_link, tip_link)?;
     Build::new(&tree, base, &path).run()
@@ -58,6 +55,8 @@ pub fn import(text: &str, origin: &str, base_link: Option<&str>, tip_link: Optio
 struct Source<'a> {
     text: &'a str,
     origin: &'a str,
+    /// Directly below the root; none where the text is no XML.
+    elements: &'a [Element],
 }
 
 impl Source<'_> {
@@ -87,18 +86,43 @@ impl Source<'_> {
         self.error(self.line("link", name, 0), format!("link {name:?}"), found, allowed, remedy)
     }
 
-    /// Line of the `nth` element `kind` called `name`: the parser keeps no positions, so the text is searched.
-    fn line(&self, kind: &str, name: &str, nth: usize) -> Option<usize> {
-        let opening = format!("<{kind}");
-        let named = [format!("name=\"{name}\""), format!("name='{name}'")];
-        self.text
-            .match_indices(&opening)
-            .filter(|(start, _)| {
-                let tag = self.text[*start..].split('>').next().unwrap_or_default();
-                tag[opening.len()..].starts_with(char::is_whitespace) && named.iter().any(|named| tag.contains(named))
-            })
-            .nth(nth)
-            .map(|(start, _)| self.text[..start].matches('\n').count() + 1)
+    /// Line of the `nth` element `tag` called `name`.
+    fn line(&self, tag: &str, name: &str, nth: usize) -> Option<usize> {
+        let mut named = self.elements.iter().filter(|element| element.tag == tag && element.name == name);
+        Some(line_of(self.text, named.nth(nth)?.range.start))
+    }
+
+    /// The parser's error with the place that the parser does not tell.
+    fn parse_error(&self, error: &urdf_rs::UrdfError, outline: &Result<Outline, Malformed>) -> UrdfError {
+        let allowed = "URDF: <robot> with <link>s and <joint>s";
+        let found = |error: &urdf_rs::UrdfError| error.to_string().replace('\n', ", ").replace("custom: ", "");
+        let outline = match outline {
+            Ok(outline) => outline,
+            Err(malformed) => {
+                let line = Some(line_of(self.text, malformed.offset));
+                return self.error(line, "", malformed.found.clone(), "well-formed XML", "correct the file");
+            }
+        };
+        // Each element alone in the robot: the first that is refused is the culprit.
+        for element in outline.elements.iter().filter(|element| matches!(element.tag.as_str(), "link" | "joint")) {
+            let alone = format!("{}{}</robot>", &self.text[outline.root.clone()], &self.text[element.range.clone()]);
+            if let Err(error) = urdf_rs::read_from_string(&alone) {
+                let line = Some(line_of(self.text, element.range.start));
+                let allowed = format!("a <{}> as URDF defines it", element.tag);
+                return self.error(
+                    line,
+                    format!("{} {:?}", element.tag, element.name),
+                    found(&error),
+                    allowed,
+                    "correct the element",
+                );
+            }
+        }
+        self.error(None, "", found(error), allowed, self.xacro_or("correct the file"))
+    }
+
+    fn xacro_or(&self, remedy: &'static str) -> &'static str {
+        if self.text.contains("<xacro:") { "expand the xacro first: xacro robot.xacro > robot.urdf" } else { remedy }
     }
 }
 
@@ -171,11 +195,7 @@ impl<'a> Tree<'a> {
             }
         }
         if robot.joints.is_empty() {
-            let remedy = if source.text.contains("<xacro:") {
-                "expand the xacro first: xacro robot.xacro > robot.urdf"
-            } else {
-                "give a file with joints"
-            };
+            let remedy = source.xacro_or("give a file with joints");
             return Err(source.error(None, "", "no joints", "an arm with at least one joint that moves", remedy));
         }
         Ok(tree)

@@ -367,3 +367,26 @@ fn urdfs_of_real_robots_are_imported() {
         println!("{}: {largest:.1e} from the file's own kinematics; {:?}", result.arm.name, result.notes);
     }
 }
+
+#[test]
+fn what_the_parser_refuses_is_given_its_line() {
+    let cases = [
+        ("<robot name=\"odd\">", "<robot name=\"odd\"><oops>", "r.urdf:27: ", "`</robot>` where `<oops>` of line 2 is open"),
+        ("<link name=\"b\"/>", "<link name=\"b\" <", "r.urdf:13: ", "`<` without `>`"),
+        ("upper=\"0.3\" effort=\"1\" velocity=\"1\"", "upper=\"0.3\"", "r.urdf:14: joint \"slide\"", "missing field `velocity`"),
+        ("<axis xyz=\"1 0 1\"/>", "<axis xyz=\"1 0\"/>", "r.urdf:14: joint \"slide\"", "expected 3 found 2 for [1 0]"),
+        (
+            "<joint name=\"bridge\" type=\"fixed\">",
+            "<joint name=\"bridge\" type=\"glued\">",
+            "r.urdf:18: joint \"bridge\"",
+            "unknown variant `glued`",
+        ),
+        ("<link name=\"c\"/>", "<link/>", "r.urdf:15: link \"\"", "missing field `name`"),
+        ("<mass value=\"2\"/>", "<mass value=\"x\"/>", "r.urdf:6: link \"a\"", "invalid float literal"),
+        ("  </link>", "  </lonk>", "r.urdf:9: ", "`</lonk>` where `<link>` of line 6 is open"),
+    ];
+    for (old, new, place, found) in cases {
+        let error = import(&ODD.replacen(old, new, 1), "r.urdf", None, Some("probe")).expect_err("refused").to_string();
+        assert!(error.starts_with(place) && error.contains(found), "{old:?} -> {new:?}: {place}, {found}\n{error}");
+    }
+}
