@@ -1,6 +1,6 @@
 //! A robot arm: its chain, what its links weigh, how they are shaped, and what stands around it.
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
 
 use crate::frames::Pose;
 use crate::kinematics::Chain;
@@ -92,6 +92,24 @@ pub enum Geometry {
         /// Radius.
         radius: f64,
     },
+}
+
+impl Inertial {
+    /// Why no body has this inertia, as what was found and what is allowed; `None` if one may have it.
+    #[must_use]
+    pub fn impossible(&self) -> Option<(String, &'static str)> {
+        let mut principal: Vec<f64> = SymmetricEigen::new(self.inertia_in_link).eigenvalues.iter().copied().collect();
+        principal.sort_by(f64::total_cmp);
+        let found = format!("principal moments {:.4e}, {:.4e}, {:.4e} kg·m²", principal[0], principal[1], principal[2]);
+        if principal[0] <= 0.0 {
+            return Some((found, "a positive definite inertia"));
+        }
+        // A flat body meets the bound with equality, so rounding must pass.
+        if principal[2] > (principal[0] + principal[1]) * (1.0 + 1e-9) {
+            return Some((found, "principal moments of which none exceeds the sum of the other two (no body has others)"));
+        }
+        None
+    }
 }
 
 impl Arm {

@@ -1,6 +1,6 @@
 //! From the file's structures to validated types: units become SI here, once.
 
-use nalgebra::{Matrix3, Point3, Quaternion, SymmetricEigen, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::error::{Invalid, suggestion};
 use super::file::*;
@@ -10,12 +10,13 @@ use super::{
 use crate::arm::{Arm, Fixture, Geometry, Inertial, Link, Shape};
 use crate::frames::Pose;
 use crate::kinematics::mdh::{self, Frame, SixParameters};
+use crate::kinematics::urdf::rpy::{rotation_from_rpy, z_onto};
 use crate::kinematics::{Joint, JointKind, Quantity};
 use crate::measurement::Sensor;
 
 type Checked<T> = Result<T, Invalid>;
 
-pub(super) fn metres_from_mm(mm: f64) -> f64 {
+fn metres_from_mm(mm: f64) -> f64 {
     mm / 1e3
 }
 
@@ -271,11 +272,19 @@ fn link(file: Option<&LinkToml>, name: String, key: &str) -> Checked<Link> {
     };
     let inertial = match (file.mass_kg, &file.centre_of_mass_mm, &file.inertia_kg_m2) {
         (None, None, None) => None,
-        (Some(mass_kg), Some(centre), Some(inertia_toml)) => Some(Inertial {
-            mass_kg: positive(mass_kg, &format!("{key}.mass_kg"))?,
-            centre_of_mass_in_link: point_from_mm(centre),
-            inertia_in_link: inertia(inertia_toml, &format!("{key}.inertia_kg_m2"))?,
-        }),
+        (Some(mass_kg), Some(centre), Some(inertia)) => {
+            let InertiaToml { xx, yy, zz, xy, xz, yz } = *inertia;
+            let inertial = Inertial {
+                mass_kg: positive(mass_kg, &format!("{key}.mass_kg"))?,
+                centre_of_mass_in_link: point_from_mm(centre),
+                inertia_in_link: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz),
+            };
+            if let Some((found, allowed)) = inertial.impossible() {
+                let remedy = "check the unit (kg·m², about the centre of mass) and the signs of the products";
+                return Err(Invalid::new(format!("{key}.inertia_kg_m2"), found, allowed, remedy));
+            }
+            Some(inertial)
+        }
         (mass, centre, inertia) => {
             let missing =
                 [("mass_kg", mass.is_none()), ("centre_of_mass_mm", centre.is_none()), ("inertia_kg_m2", inertia.is_none())];
@@ -295,35 +304,6 @@ fn link(file: Option<&LinkToml>, name: String, key: &str) -> Checked<Link> {
         .map(|(index, file)| shape(file, &format!("{key}.shapes[{}]", index + 1)))
         .collect::<Checked<Vec<Shape>>>()?;
     Ok(Link { name, inertial, shapes })
-}
-
-fn inertia(file: &InertiaToml, key: &str) -> Checked<Matrix3<f64>> {
-    let InertiaToml { xx, yy, zz, xy, xz, yz } = *file;
-    let inertia = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-    match inertia_problem(&inertia) {
-        None => Ok(inertia),
-        Some((found, allowed)) => Err(Invalid::new(
-            key,
-            found,
-            allowed,
-            "check the unit (kg·m², about the centre of mass) and the signs of the products",
-        )),
-    }
-}
-
-/// Why no body has this inertia, as what was found and what is allowed; `None` if one may.
-pub(crate) fn inertia_problem(inertia: &Matrix3<f64>) -> Option<(String, &'static str)> {
-    let mut principal: Vec<f64> = SymmetricEigen::new(*inertia).eigenvalues.iter().copied().collect();
-    principal.sort_by(f64::total_cmp);
-    let text = format!("principal moments {:.4e}, {:.4e}, {:.4e} kg·m²", principal[0], principal[1], principal[2]);
-    if principal[0] <= 0.0 {
-        return Some((text, "a positive definite inertia"));
-    }
-    // A flat body meets the bound with equality, so rounding must pass.
-    if principal[2] > (principal[0] + principal[1]) * (1.0 + 1e-9) {
-        return Some((text, "principal moments of which none exceeds the sum of the other two (no body has others)"));
-    }
-    None
 }
 
 fn shape(file: &ShapeToml, key: &str) -> Checked<Shape> {
@@ -370,28 +350,6 @@ fn shape(file: &ShapeToml, key: &str) -> Checked<Shape> {
             },
         },
     })
-}
-
-/// The shortest turn that takes z to the unit vector `direction`.
-fn z_onto(direction: &Vector3<f64>) -> UnitQuaternion<f64> {
-    // Half way between 1 and twice the turn; nothing is left of it when z is turned round, and any axis across z will do.
-    let half_way = Quaternion::new(1.0 + direction.z, -direction.y, direction.x, 0.0);
-    if half_way.norm() < 1e-9 {
-        return UnitQuaternion::new_unchecked(Quaternion::new(0.0, 1.0, 0.0, 0.0));
-    }
-    UnitQuaternion::new_normalize(half_way)
-}
-
-/// `Rot(z, yaw) Rot(y, pitch) Rot(x, roll)` of `[roll, pitch, yaw]`, rad.
-pub(crate) fn rotation_from_rpy([roll, pitch, yaw]: [f64; 3]) -> UnitQuaternion<f64> {
-    // Through libm, so that every machine gets the same bits.
-    let about = |axis: usize, angle: f64| {
-        let (sine, cosine) = libm::sincos(angle / 2.0);
-        let mut vector = Vector3::zeros();
-        vector[axis] = sine;
-        UnitQuaternion::new_unchecked(Quaternion::from_parts(cosine, vector))
-    };
-    about(2, yaw) * about(1, pitch) * about(0, roll)
 }
 
 fn sensor(file: &SensorToml) -> Checked<Sensor> {

@@ -7,8 +7,6 @@ mod reader;
 #[cfg(test)]
 mod tests;
 
-#[allow(unused_imports)]
-pub(crate) use convert::{inertia_problem, rotation_from_rpy};
 pub use error::{Problem, SceneError};
 pub use reader::{SceneFile, parse, parse_injected, read};
 
