@@ -45,6 +45,16 @@ impl Unit {
     }
 }
 
+/// Logs a chart without values under `path`.
+pub(super) fn log_empty(stream: &RecordingStream, path: &str) -> RecordingStreamResult<()> {
+    let text = Points2D::new([[(WIDTH / 2.0) as f32, (HEIGHT / 2.0) as f32]])
+        .with_labels(["nothing is measured yet"])
+        .with_show_labels(true)
+        .with_colors([TEXT])
+        .with_radii([rerun::Radius::new_ui_points(0.0)]);
+    stream.log(format!("{path}/text"), &text)
+}
+
 /// Logs the chart under `path`.
 pub(super) fn log(stream: &RecordingStream, path: &str, unit: Unit, series: &[Series]) -> RecordingStreamResult<()> {
     let drawable = |value: f64| value.is_finite() && value > 0.0;

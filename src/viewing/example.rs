@@ -302,6 +302,29 @@ fn a_viewer_that_takes_nothing_holds_up_no_run() {
     assert!(since.elapsed().as_secs_f64() < 12.0, "{:?}", since.elapsed());
 }
 
+/// Streams a run at the pace of a live one to the target that the environment names.
+#[test]
+#[ignore = "streams to $KINCAL_VIEWING_TARGET"]
+fn live() {
+    let target: Target = std::env::var("KINCAL_VIEWING_TARGET").unwrap().parse().unwrap();
+    let (arm, events) = events(20, 40, 30, 20);
+    let Some(mut viewer) = open(&target, &arm, "example").unwrap() else {
+        eprintln!("nobody looks");
+        return;
+    };
+    eprintln!("{}", viewer.describe());
+    let mut slowest = std::time::Duration::ZERO;
+    for event in &events {
+        let since = std::time::Instant::now();
+        viewer.take(event).unwrap();
+        slowest = slowest.max(since.elapsed());
+        std::thread::sleep(std::time::Duration::from_millis(40));
+    }
+    let since = std::time::Instant::now();
+    let outcome = viewer.finish();
+    eprintln!("slowest event {slowest:?}, end {:?}: {outcome:?}", since.elapsed());
+}
+
 /// Writes recordings to look at, and says what they cost.
 #[test]
 #[ignore = "writes recordings for screenshots to $KINCAL_VIEWING_SAMPLES"]

@@ -149,6 +149,9 @@ fn tree(parts: Parts, camera: Camera) -> Node {
     let summary = view("TextDocument", "Summary", &["/summary"]);
     let notes = view("TextLog", "Notes", &["/notes/**"]);
     let mut cell = vec!["/world/base/**", "/world/cell/**", "/world/arm/**", "/world/arm_line/**", "/world/design/**"];
+    if parts.swarm {
+        cell.push("/world/swarm/best/**");
+    }
     let mut cell_name = "Cell: arm, chosen end points (amber)".to_owned();
     if parts.measured {
         cell.push("/world/measured/**");

@@ -96,6 +96,10 @@ impl Picture {
         layout::send(&stream, APPLICATION, Parts::of(command), self.camera())?;
         stream.set_time_sequence(EVENTS, 0);
         self.body.log_shapes(&stream)?;
+        self.log_scales(&stream, &["nothing is measured yet".to_owned()])?;
+        for path in ["errors/position", "errors/attitude"] {
+            chart::log_empty(&stream, path)?;
+        }
         Ok(stream)
     }
 
@@ -157,7 +161,7 @@ impl Picture {
         if !swarm.best_configurations.is_empty() {
             self.best.clone_from(&swarm.best_configurations);
             let points = self.best.iter().filter_map(|joints| self.body.tool(joints)).map(|tool| tool.translation.vector);
-            let best = Points3D::new(points.map(|p| point(&p))).with_colors([AMBER]).with_radii([self.size(0.009)]);
+            let best = Points3D::new(points.map(|p| point(&p))).with_colors([AMBER]).with_radii([self.size(0.007)]);
             stream.log("world/swarm/best", &best)?;
         }
         if !self.best.is_empty() {
@@ -328,7 +332,7 @@ impl Picture {
             .with_colors(colours)
             .with_radii([self.size(0.0035)]);
         stream.log(format!("world/residuals/{name}"), &arrows)?;
-        Ok(format!("arrows {name} ×{scale}: 10 cm = {}", metres(0.1 / scale)))
+        Ok(format!("{name}: arrows ×{scale}, 10 cm = {}", metres(0.1 / scale)))
     }
 
     /// The scales as labels above the arm.

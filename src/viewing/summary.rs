@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::design::outcome::{DesignOutcome, StopReason, SwarmIteration};
-use crate::identification::outcome::{Errors, Identification, Summary as Numbers};
+use crate::identification::outcome::{Errors, Identification};
 use crate::measurement::{Measurement, Role};
 use crate::quality::Indexes;
 use crate::recording::event::Start;
@@ -81,7 +81,8 @@ impl Summary {
     /// `scales` states how long the arrows of the residuals are drawn.
     pub(super) fn identified(&mut self, identified: &Identification, scales: &[String]) {
         let mut text = format!(
-            "#### Identified\n**{}** after {} iterations: {}. Rank {} of {} parameters, {} equations, residual scale {}.\n\n",
+            "#### Identified\n{}**{}** after {} iterations: {}. Rank {} of {} parameters, {} equations, residual scale {}.\n\n",
+            table(identified),
             if identified.converged { "converged" } else { "NOT CONVERGED" },
             identified.iterations,
             identified.reason.trim_end_matches('.'),
@@ -90,9 +91,7 @@ impl Summary {
             identified.equations,
             significant(identified.residual_scale, 4),
         );
-        text += &table(identified);
         if !scales.is_empty() {
-            text += "Arrows of the residuals:\n\n";
             for scale in scales {
                 writeln!(text, "- {scale}").ok();
             }
@@ -116,34 +115,26 @@ impl Summary {
     }
 }
 
-/// Errors before and after, on held-out configurations first where there are any.
+/// Errors before and after, on held-out configurations first where there are any; the first of them in a sentence.
 fn table(identified: &Identification) -> String {
     let mut pairs: Vec<(&str, &Errors, &Errors)> = Vec::new();
     if let (Some(before), Some(after)) = (&identified.held_out_nominal, &identified.held_out) {
         pairs.push(("held out", before, after));
     }
     pairs.push(("fitted", &identified.nominal, &identified.fitted));
-    let mut text = "| error |".to_owned();
-    for (name, _, after) in &pairs {
-        write!(text, " {name} ({}), before | after |", after.count).ok();
+    let mm = |value: f64| significant(value * 1e3, 3);
+    let degrees = |value: Option<f64>| value.map_or("–".to_owned(), |value| significant(value.to_degrees(), 3));
+    let mut text = String::new();
+    if let Some((name, before, after)) = pairs.first() {
+        let (before, now) = (mm(before.position_m.mean), mm(after.position_m.mean));
+        write!(text, "Mean error **{before} mm → {now} mm** on {} configurations {name}.\n\n", after.count).ok();
     }
-    write!(text, "\n|---|{}\n", "---|---|".repeat(pairs.len())).ok();
-    let position = |errors: &Errors| Some(errors.position_m);
-    let rotation = |errors: &Errors| errors.rotation_rad;
-    let quantities: [(&str, f64, &dyn Fn(&Errors) -> Option<Numbers>); 2] =
-        [("mm", 1e3, &position), ("deg", 1f64.to_degrees(), &rotation)];
-    let statistics: [(&str, fn(&Numbers) -> f64); 3] = [("mean", |n| n.mean), ("rms", |n| n.rms), ("max", |n| n.max)];
-    for (unit, factor, quantity) in quantities {
-        if pairs.iter().all(|(_, before, after)| quantity(before).is_none() && quantity(after).is_none()) {
-            continue;
-        }
-        for (name, statistic) in statistics {
-            write!(text, "| {name}, {unit} |").ok();
-            for errors in pairs.iter().flat_map(|(_, before, after)| [before, after]) {
-                let number = quantity(errors).map_or("–".to_owned(), |n| significant(statistic(&n) * factor, 4));
-                write!(text, " {number} |").ok();
-            }
-            text += "\n";
+    text += "| | mean mm | max mm | mean ° | max ° |\n|---|---|---|---|---|\n";
+    for (name, before, after) in pairs {
+        for (when, errors) in [("before", before), ("after", after)] {
+            let Errors { count, position_m: position, rotation_rad: rotation } = errors;
+            let [mean, max] = [degrees(rotation.map(|r| r.mean)), degrees(rotation.map(|r| r.max))];
+            writeln!(text, "| {count} {name}, {when} | {} | {} | {mean} | {max} |", mm(position.mean), mm(position.max)).ok();
         }
     }
     text + "\n"
