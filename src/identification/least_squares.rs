@@ -12,9 +12,15 @@ use crate::quality::subspace::{Subspace, late};
 use crate::scene::Weights;
 
 /// Steps after which a fit that has not settled is given up.
-const MAX_STEPS: usize = 60;
-/// The fit has converged when a step changes the weighted residuals by less than this share of their length, or of one sigma.
-const STEP_TOLERANCE: f64 = 1e-9;
+const MAX_STEPS: usize = 200;
+/// The fit has converged when an undamped step changes the predictions of all measurements together by less than this many sigmas
+/// (of the declared noise, or of the residuals where these are larger).
+const STEP_TOLERANCE: f64 = 1e-6;
+/// Relative change of the sum of squares that counts as rounding.
+const ROUNDING: f64 = 1e-12;
+/// A combination whose standard error would be above this (m or rad) cannot be told from this data: nobody's nominal arm is that
+/// wrong, and letting it loose only spoils the fit.
+const PLAUSIBLE_ERROR: f64 = 0.03;
 /// Below this probability of the residuals under the declared noise, the noise is taken to be larger than declared.
 const DECLARED_NOISE_REJECTED: f64 = 1e-3;
 
@@ -88,26 +94,40 @@ pub fn identify(
     let problem = Problem::new(arm, sensor, weights, &fit)?;
     let nominal = arm.chain.nominal();
 
-    let start = problem.linearise(&nominal);
-    let subspace = Subspace::reveal(&start.jacobian, &late(arm));
-    let rank = subspace.rank();
     let equations = problem.equations();
     let structural = Subspace::of_structure(arm, problem.rows_per_pose == 6).rank();
-    if equations < structural || rank == 0 {
+    if equations < structural {
         let needed = structural.div_ceil(problem.rows_per_pose);
         return Err(IdentificationError::TooFew { poses: fit.len(), equations, rank: structural, needed });
     }
 
-    let solution = solve(&problem, &subspace.independent, nominal.clone(), start);
+    // How large the noise really is shows only in the residuals, and with it which combinations drown in it.
+    let mut assumed = 1.0;
+    let (subspace, solution, noise, scale) = loop {
+        let start = problem.linearise(&nominal);
+        let subspace = Subspace::reveal(&problem.in_sigmas(&start.jacobian), &late(arm), assumed / PLAUSIBLE_ERROR);
+        let solution = solve(&problem, &subspace.independent, nominal.clone(), start);
+        let noise = problem.noise_scale(&solution.values);
+        let freedom = equations - subspace.rank();
+        let scale = if freedom > 0 { (noise.sum_of_squares / freedom as f64).sqrt() } else { 1.0 };
+        let smaller = |scale: f64| problem.rank(&nominal, scale / PLAUSIBLE_ERROR, arm) < subspace.rank();
+        if noise.known && scale > 1.2 * assumed && scale.is_finite() && smaller(scale) {
+            assumed = scale;
+        } else {
+            break (subspace, solution, noise, scale);
+        }
+    };
+    let rank = subspace.rank();
     let mut notes = Vec::new();
     if rank < structural {
         notes.push(format!(
-            "these configurations tell {rank} combinations apart, this arm has {structural}: measure more different configurations"
+            "of the {structural} combinations that this arm's structure allows, these configurations show {rank}: the rest would be \
+             uncertain by more than {:.0} mm or mrad and is held at nominal; measure more different configurations, or a target \
+             further from the last axis",
+            PLAUSIBLE_ERROR * 1e3
         ));
     }
     let freedom = equations - rank;
-    let noise = problem.noise_scale(&solution.values);
-    let scale = if freedom > 0 { (noise.sum_of_squares / freedom as f64).sqrt() } else { 1.0 };
     let p_value = match (freedom, ChiSquared::new(freedom as f64)) {
         (1.., Ok(distribution)) => distribution.sf(noise.sum_of_squares),
         _ => 1.0,
@@ -199,7 +219,7 @@ pub(super) fn fit_some(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement]
     let problem = Problem::new(arm, sensor, Weights::Noise, measurements).ok()?;
     let nominal = arm.chain.nominal();
     let start = problem.linearise(&nominal);
-    let seen = Subspace::reveal(&start.jacobian.select_columns(free), &vec![false; free.len()]);
+    let seen = Subspace::reveal(&start.jacobian.select_columns(free), &vec![false; free.len()], 0.0);
     let columns: Vec<usize> = seen.independent.iter().map(|position| free[*position]).collect();
     let solution = solve(&problem, &columns, nominal, start);
     solution.converged.then_some(solution.values)
@@ -361,6 +381,22 @@ impl<'a> Problem<'a> {
         NoiseScale { sum_of_squares, known }
     }
 
+    /// The weighted Jacobian with rows in units of the declared sigma instead.
+    fn in_sigmas(&self, jacobian: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut scaled = jacobian.clone();
+        for (index, mut row) in scaled.row_iter_mut().enumerate() {
+            let weights = self.rows[index / self.rows_per_pose];
+            let part = index % self.rows_per_pose / 3;
+            // A reading that is declared exact is taken to a nanometre or nanoradian.
+            row *= 1.0 / (weights.weight[part] * weights.sigma[part].max(1e-9));
+        }
+        scaled
+    }
+
+    fn rank(&self, values: &[f64], floor: f64, arm: &Arm) -> usize {
+        Subspace::reveal(&self.in_sigmas(&self.linearise(values).jacobian), &late(arm), floor).rank()
+    }
+
     /// Covariance of the independent parameters from the declared noise: `A Jᵀ W Σ W J A` with `A = (Jᵀ J)⁻¹` of the weighted
     /// Jacobian, which is A itself where the weights are the sigmas.
     fn covariance(&self, jacobian: &DMatrix<f64>, subspace: &Subspace) -> DMatrix<f64> {
@@ -419,7 +455,8 @@ fn solve(problem: &Problem<'_>, columns: &[usize], start: Vec<f64>, linearised: 
     let mut values = start;
     let mut here = linearised;
     let mut cost = here.residuals.norm_squared();
-    let mut damping = 0.0;
+    // Damping and the factor by which it grows after a failure, after Nielsen 1999.
+    let (mut damping, mut growth): (f64, f64) = (0.0, 2.0);
     let done = |values, here: Linearised, converged, reason: String, steps| Solution {
         values,
         jacobian: here.jacobian,
@@ -439,24 +476,39 @@ fn solve(problem: &Problem<'_>, columns: &[usize], start: Vec<f64>, linearised: 
         }
         let there = problem.linearise(&trial);
         let trial_cost = there.residuals.norm_squared();
-        let settled = change <= STEP_TOLERANCE * cost.sqrt().max(problem.one_sigma());
-        if trial_cost.is_finite() && (trial_cost <= cost || settled) {
+        let sigma = (cost / problem.equations() as f64).sqrt().max(problem.one_sigma());
+        let settled = change <= STEP_TOLERANCE * sigma;
+        let undamped = damping == 0.0;
+        if trial_cost.is_finite() && (trial_cost <= cost * (1.0 + ROUNDING) || settled) {
+            // Gain over what the linear model, with its damping, promises.
+            let promised = change * change + 2.0 * damping * scaled_square(&jacobian, &step);
+            let gain = if promised > 0.0 { (cost - trial_cost) / promised } else { 1.0 };
+            damping *= (1.0 - (2.0 * gain - 1.0).powi(3)).clamp(0.1, 2.0);
+            growth = 2.0;
+            if damping < 1e-9 || settled {
+                damping = 0.0;
+            }
             values = trial;
             here = there;
             cost = trial_cost;
-            damping = if damping < 1e-9 { 0.0 } else { damping * 0.1 };
-            if settled && damping == 0.0 {
-                let reason = "the last step changed the predictions by less than a billionth of the residuals".to_owned();
+            if settled && undamped {
+                let reason = "the last step changed the predictions by less than a millionth of a standard deviation".to_owned();
                 return done(values, here, true, reason, step_number);
             }
         } else {
-            damping = if damping == 0.0 { 1e-4 } else { damping * 10.0 };
+            damping = if damping == 0.0 { 1e-4 } else { damping * growth };
+            growth *= 2.0;
             if damping > 1e12 {
                 return done(values, here, false, "no step makes the residuals smaller".to_owned(), step_number);
             }
         }
     }
     done(values, here, false, format!("not settled after {MAX_STEPS} steps"), MAX_STEPS)
+}
+
+/// Square of the step's length in units in which every column of the Jacobian has length one.
+fn scaled_square(jacobian: &DMatrix<f64>, step: &DVector<f64>) -> f64 {
+    jacobian.column_iter().zip(step.iter()).map(|(column, value)| column.norm_squared() * value * value).sum()
 }
 
 impl Problem<'_> {

@@ -41,12 +41,15 @@ impl Subspace {
     /// marks are dropped first.
     ///
     /// The rank comes from the singular values of the column-scaled Jacobian. Columns are then taken one by one: of those whose
-    /// part outside the span of the columns taken so far is at least [`NEARLY_BEST`] of the largest such part, the first. That
-    /// keeps the basis well conditioned (a parameter that hardly moves the poses in a direction of its own cannot stand in for one
-    /// that does, least of all when the true errors are large), and the answer does not hang on which of two nearly equal
-    /// columns is larger.
+    /// part outside the span of the columns taken so far is at least [`NEARLY_BEST`] of the largest such part, the first. Parts
+    /// are compared per metre and radian: of a target's offset and the angle of the joint that it nearly lies on, the offset is
+    /// taken, for a parameter that hardly moves the poses can stand in for one that does only through absurd values. The answer
+    /// does not hang on which of two nearly equal columns is larger.
+    ///
+    /// `floor` is the singular value of `jacobian` itself below which a direction counts as not seen at all; zero where only exact
+    /// dependence counts.
     #[must_use]
-    pub fn reveal(jacobian: &DMatrix<f64>, late: &[bool]) -> Subspace {
+    pub fn reveal(jacobian: &DMatrix<f64>, late: &[bool], floor: f64) -> Subspace {
         let columns = jacobian.ncols();
         let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
         let largest = norms.iter().copied().fold(0.0, f64::max);
@@ -54,22 +57,26 @@ impl Subspace {
             norms.iter().map(|norm| if *norm > largest * RELATIVE_TOLERANCE { 1.0 / norm } else { 0.0 }).collect();
         // The triangular factor has the same lengths and angles between columns, however many rows there are.
         let triangle = if jacobian.nrows() > columns { jacobian.clone().qr().unpack_r() } else { jacobian.clone() };
-        let mut rest = triangle.clone();
-        for (mut column, scale) in rest.column_iter_mut().zip(&scale) {
+        let mut scaled = triangle.clone();
+        for (mut column, scale) in scaled.column_iter_mut().zip(&scale) {
             column *= *scale;
         }
-        let mut singular_values: Vec<f64> = rest.singular_values().iter().copied().collect();
+        let mut singular_values: Vec<f64> = scaled.singular_values().iter().copied().collect();
         singular_values.sort_by(|a, b| b.total_cmp(a));
         let threshold = singular_values.first().copied().unwrap_or(0.0) * RELATIVE_TOLERANCE;
-        let rank = singular_values.iter().filter(|value| **value > threshold).count();
+        let exact = singular_values.iter().filter(|value| **value > threshold).count();
+        let seen = triangle.singular_values().iter().filter(|value| **value > floor).count();
+        let rank = if floor > 0.0 { exact.min(seen) } else { exact };
 
+        let mut rest = triangle.clone();
         let mut independent = Vec::with_capacity(rank);
         for (class, least) in PASSES {
             while independent.len() < rank {
-                let candidates = || (0..columns).filter(|column| late[*column] == class);
                 let length = |column: usize| rest.column(column).norm();
+                let candidates =
+                    || (0..columns).filter(|column| late[*column] == class && length(*column) * scale[*column] > least);
                 let longest = candidates().map(length).fold(0.0, f64::max);
-                let Some(chosen) = candidates().find(|column| longest > least && length(*column) >= NEARLY_BEST * longest) else {
+                let Some(chosen) = candidates().find(|column| length(*column) >= NEARLY_BEST * longest) else {
                     break;
                 };
                 independent.push(chosen);
@@ -114,7 +121,7 @@ impl Subspace {
             let (_, jacobian) = chain.jacobian(&joints);
             stacked.rows_mut(sample * rows_per_pose, rows_per_pose).copy_from(&jacobian.rows(0, rows_per_pose));
         }
-        Subspace::reveal(&stacked, &late(arm))
+        Subspace::reveal(&stacked, &late(arm), 0.0)
     }
 }
 
@@ -131,13 +138,15 @@ mod tests {
 
     #[test]
     fn a_redundant_column_is_dropped_and_its_share_told() {
-        // Third column = 2 × first − second; the fourth is not seen at all.
-        let jacobian = DMatrix::from_row_slice(3, 4, &[1.0, 0.0, 2.0, 0.0, 0.0, 1.0, -1.0, 0.0, 1.0, 1.0, 1.0, 0.0]);
-        let subspace = Subspace::reveal(&jacobian, &[false; 4]);
+        // Third column = 0.2 × first − 0.1 × second; the fourth is not seen at all.
+        let jacobian = DMatrix::from_row_slice(3, 4, &[1.0, 0.0, 0.2, 0.0, 0.0, 1.0, -0.1, 0.0, 1.0, 1.0, 0.1, 0.0]);
+        let subspace = Subspace::reveal(&jacobian, &[false; 4], 0.0);
         assert_eq!((subspace.rank(), &subspace.independent, &subspace.dropped), (2, &vec![0, 1], &vec![2, 3]));
-        assert!((subspace.share.column(0) - nalgebra::dvector![2.0, -1.0]).norm() < 1e-14);
+        assert!((subspace.share.column(0) - nalgebra::dvector![0.2, -0.1]).norm() < 1e-14);
         assert!(subspace.share.column(1).norm() < 1e-14);
-        let other = Subspace::reveal(&jacobian, &[true, false, false, false]);
+        let other = Subspace::reveal(&jacobian, &[true, false, false, false], 0.0);
         assert_eq!(other.independent, vec![1, 2]);
+        // What is seen less than the floor is not seen.
+        assert_eq!(Subspace::reveal(&jacobian, &[false; 4], 1.1).rank(), 1);
     }
 }
