@@ -67,7 +67,12 @@ pub(super) struct Picture {
     roles: BTreeMap<usize, Role>,
     series_named: bool,
     temperatures_named: bool,
+    /// Whether the chart and the arrows lag behind the measurements.
+    stale: bool,
 }
+
+/// Which of its two vectors a residual is drawn with.
+type Vector = fn(&Residual) -> &[f64; 6];
 
 impl Picture {
     pub(super) fn new(arm: &Arm, name: &str) -> Result<Picture, ViewerError> {
@@ -81,6 +86,7 @@ impl Picture {
             roles: BTreeMap::new(),
             series_named: false,
             temperatures_named: false,
+            stale: false,
         })
     }
 
@@ -265,13 +271,23 @@ impl Picture {
         }
         // Chart and arrows are drawn anew, ever more rarely, so that the work stays in proportion to the measurements.
         let count = self.measured.len();
-        if count > 0 && (count <= BLOCK || count.is_multiple_of(count / (BLOCK / 2))) {
-            let scale = self.arrows(stream, "before", &self.measured, |r| &r.nominal, [BEFORE, BEFORE_HELD_OUT])?;
-            self.log_scales(stream, &[scale])?;
-            self.log_errors(stream, &self.measured, false)?;
+        self.stale = true;
+        if count <= BLOCK || count.is_multiple_of(count / (BLOCK / 2)) {
+            self.catch_up(stream)?;
         }
         self.summary.measured(measurement);
         Ok(())
+    }
+
+    /// Draws what was put off: to be called after the last event.
+    pub(super) fn catch_up(&mut self, stream: &RecordingStream) -> RecordingStreamResult<()> {
+        if !self.stale || self.measured.is_empty() {
+            return Ok(());
+        }
+        self.stale = false;
+        let scale = self.arrows(stream, "before", &self.measured, |r| &r.nominal, [BEFORE, BEFORE_HELD_OUT])?;
+        self.log_scales(stream, &[scale])?;
+        self.log_errors(stream, &self.measured, false)
     }
 
     fn identified(&mut self, stream: &RecordingStream, identified: &Identification) -> RecordingStreamResult<()> {
@@ -283,13 +299,14 @@ impl Picture {
             self.log_scales(stream, &scales)?;
         }
         self.log_errors(stream, residuals, true)?;
+        self.stale = false;
         self.summary.identified(identified, &scales);
         Ok(())
     }
 
     /// Charts of the error of each configuration; `after`: those of the identified model too.
     fn log_errors(&self, stream: &RecordingStream, residuals: &[Residual], after: bool) -> RecordingStreamResult<()> {
-        let kinds: [(&str, [u8; 3], Role, fn(&Residual) -> &[f64; 6]); 4] = [
+        let kinds: [(&str, [u8; 3], Role, Vector); 4] = [
             ("before", BEFORE, Role::Fit, |r| &r.nominal),
             ("before, held out", BEFORE_HELD_OUT, Role::HeldOut, |r| &r.nominal),
             ("after", FIT, Role::Fit, |r| &r.identified),
@@ -321,7 +338,7 @@ impl Picture {
         stream: &RecordingStream,
         name: &str,
         residuals: &[Residual],
-        vector: fn(&Residual) -> &[f64; 6],
+        vector: Vector,
         [fit, held_out]: [[u8; 3]; 2],
     ) -> RecordingStreamResult<String> {
         let mean = residuals.iter().map(|r| length(&vector(r)[..3])).sum::<f64>() / residuals.len().max(1) as f64;

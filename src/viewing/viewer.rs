@@ -337,6 +337,7 @@ fn show(
     while let Ok(event) = events.recv() {
         picture.take(&stream, &event).map_err(draw)?;
     }
+    picture.catch_up(&stream).map_err(draw)?;
     let patience = destination.patience().unwrap_or(Duration::MAX);
     let flushed = stream.flush_with_timeout(patience);
     // The file's footer is written when the stream goes.
