@@ -308,7 +308,7 @@ fn a_viewer_that_takes_nothing_holds_up_no_run() {
 fn live() {
     let target: Target = std::env::var("KINCAL_VIEWING_TARGET").unwrap().parse().unwrap();
     let (arm, events) = events(20, 40, 30, 20);
-    let Some(mut viewer) = open(&target, &arm, "example").unwrap() else {
+    let Some(mut viewer) = open(&target, &arm, "example").unwrap_or_else(|error| panic!("{error}")) else {
         eprintln!("nobody looks");
         return;
     };

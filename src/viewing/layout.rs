@@ -149,9 +149,6 @@ fn tree(parts: Parts, camera: Camera) -> Node {
     let summary = view("TextDocument", "Summary", &["/summary"]);
     let notes = view("TextLog", "Notes", &["/notes/**"]);
     let mut cell = vec!["/world/base/**", "/world/cell/**", "/world/arm/**", "/world/arm_line/**", "/world/design/**"];
-    if parts.swarm {
-        cell.push("/world/swarm/best/**");
-    }
     let mut cell_name = "Cell: arm, chosen end points (amber)".to_owned();
     if parts.measured {
         cell.push("/world/measured/**");
@@ -169,21 +166,17 @@ fn tree(parts: Parts, camera: Camera) -> Node {
             camera,
         )
     };
-    let indexes = || plot("Indexes of the best set, each as 2/π·atan", &["/swarm/indexes/**"], true);
+    let indexes = || plot("Indexes of the best set: O_C and its parts as 2/π·atan", &["/swarm/indexes/**"], true);
     let fitness = || {
         tabs(vec![
-            plot("Fitness O_C: particles, best", &["/swarm/fitness/**"], false),
+            plot("Fitness O_C: swarm's best (amber), particles", &["/swarm/fitness/**"], false),
             plot("Evaluations, rejections", &["/swarm/effort/**"], true),
             plot("ω, c1, c2", &["/swarm/coefficients/**"], true),
         ])
     };
-    let errors = || {
-        tabs(vec![
-            error_chart("Position error", "/errors/position/**"),
-            error_chart("Attitude error", "/errors/attitude/**"),
-            plot("Temperatures, °C", &["/temperatures/**"], true),
-        ])
-    };
+    let position = error_chart("Position error", "/errors/position/**");
+    let attitude = error_chart("Attitude error", "/errors/attitude/**");
+    let temperatures = plot("Temperatures, °C", &["/temperatures/**"], true);
     let side = tabs(vec![summary, notes]);
     match (parts.swarm, parts.measured) {
         (true, false) => columns(vec![
@@ -194,9 +187,13 @@ fn tree(parts: Parts, camera: Camera) -> Node {
         (true, true) => columns(vec![
             (4.0, rows(vec![(10.0, cell), (5.0, indexes()), (4.0, fitness())])),
             (4.0, rows(vec![(1.0, residuals()), (1.0, swarm())])),
-            (3.0, rows(vec![(2.0, side), (1.0, errors())])),
+            (3.0, rows(vec![(2.0, side), (1.0, tabs(vec![position, attitude, temperatures]))])),
         ]),
-        (false, _) => columns(vec![(4.0, cell), (4.0, residuals()), (3.0, rows(vec![(2.0, side), (1.0, errors())]))]),
+        (false, _) => {
+            let scenes = columns(vec![(1.0, cell), (1.0, residuals())]);
+            let charts = columns(vec![(1.0, position), (1.0, attitude)]);
+            columns(vec![(8.0, rows(vec![(5.0, scenes), (3.0, charts)])), (3.0, rows(vec![(2.0, side), (1.0, temperatures)]))])
+        }
     }
 }
 

@@ -4,7 +4,9 @@
 //! measurement) and `time` (of the session) the measuring. Clock times are not recorded.
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
+use rerun::log::ChunkBatcherConfig;
 use rerun::sink::LogSink;
 use rerun::{
     Arrows3D, LineStrips3D, Points3D, Radius, RecordingStream, RecordingStreamBuilder, RecordingStreamResult, Scalars,
@@ -45,6 +47,8 @@ const GOOD: [u8; 3] = [104, 160, 214];
 const PERSONAL: [u8; 3] = [96, 112, 140];
 const CURVES: [[u8; 3]; 6] = [AMBER, [110, 170, 230], [90, 200, 170], [200, 130, 220], [230, 120, 120], [170, 180, 120]];
 
+/// How long rows are collected before they are sent.
+const BATCH: Duration = Duration::from_millis(100);
 /// Measured points that share an entity: growing entities of this size keep what is sent in proportion to what is measured.
 const BLOCK: usize = 64;
 /// Chosen configurations drawn as lines; more would hide the rest.
@@ -63,7 +67,12 @@ pub(super) struct Picture {
     roles: BTreeMap<usize, Role>,
     series_named: bool,
     temperatures_named: bool,
+    /// Whether the chart and the arrows lag behind the measurements.
+    stale: bool,
 }
+
+/// Which of its two vectors a residual is drawn with.
+type Vector = fn(&Residual) -> &[f64; 6];
 
 impl Picture {
     pub(super) fn new(arm: &Arm, name: &str) -> Result<Picture, ViewerError> {
@@ -77,6 +86,7 @@ impl Picture {
             roles: BTreeMap::new(),
             series_named: false,
             temperatures_named: false,
+            stale: false,
         })
     }
 
@@ -87,9 +97,11 @@ impl Picture {
             _ => "",
         };
         let builder = RecordingStreamBuilder::new(APPLICATION).enabled(true).recording_id(self.recording_id(first));
-        let (_, info, _, batching, hooks, _) = builder.into_args();
+        let (_, info, _, _, hooks, _) = builder.into_args();
+        // The SDK's own choice for viewers sends every row alone, which costs ten times the memory there.
+        let batching = ChunkBatcherConfig { flush_tick: BATCH, ..ChunkBatcherConfig::DEFAULT };
         // Without Rerun's own properties: they hold the hour at which the picture was made.
-        let stream = RecordingStream::new(info, None, batching, hooks, sink)?;
+        let stream = RecordingStream::new(info, None, Some(batching), hooks, sink)?;
         stream.set_log_time_enabled(false);
         stream.set_log_tick_enabled(false);
         stream.send_recording_name(self.name.as_str())?;
@@ -152,6 +164,12 @@ impl Picture {
         Radius::new_scene_units((share * self.body.stretch) as f32)
     }
 
+    /// The tool's nominal places in `configurations`, as balls of a share of the arm's length.
+    fn end_points(&self, configurations: &[Vec<f64>], share: f64) -> Points3D {
+        let tools = configurations.iter().filter_map(|joints| self.body.tool(joints));
+        Points3D::new(tools.map(|tool| point(&tool.translation.vector))).with_colors([AMBER]).with_radii([self.size(share)])
+    }
+
     fn swarm(&mut self, stream: &RecordingStream, swarm: &SwarmIteration) -> RecordingStreamResult<()> {
         stream.set_time_sequence(ITERATIONS, swarm.iteration as i64);
         if !self.series_named {
@@ -160,9 +178,8 @@ impl Picture {
         }
         if !swarm.best_configurations.is_empty() {
             self.best.clone_from(&swarm.best_configurations);
-            let points = self.best.iter().filter_map(|joints| self.body.tool(joints)).map(|tool| tool.translation.vector);
-            let best = Points3D::new(points.map(|p| point(&p))).with_colors([AMBER]).with_radii([self.size(0.007)]);
-            stream.log("world/swarm/best", &best)?;
+            stream.log("world/swarm/best", &self.end_points(&self.best, 0.009))?;
+            stream.log("world/design/end_points", &self.end_points(&self.best, 0.006))?;
         }
         if !self.best.is_empty() {
             // One configuration of the best set per iteration: playing the swarm moves the arm through the set.
@@ -190,14 +207,7 @@ impl Picture {
     }
 
     fn designed(&mut self, stream: &RecordingStream, design: &DesignOutcome) -> RecordingStreamResult<()> {
-        let tools: Vec<[f32; 3]> = design
-            .configurations
-            .iter()
-            .filter_map(|joints| self.body.tool(joints))
-            .map(|tool| point(&tool.translation.vector))
-            .collect();
-        let chosen = Points3D::new(tools).with_colors([AMBER]).with_radii([self.size(0.006)]);
-        stream.log("world/design/end_points", &chosen)?;
+        stream.log("world/design/end_points", &self.end_points(&design.configurations, 0.006))?;
         let arms = design.configurations.iter().take(LINES).map(|joints| self.body.skeleton(joints));
         let arms = LineStrips3D::new(arms).with_colors([AMBER_LINES]);
         stream.log("world/design/configurations", &arms.with_radii([Radius::new_ui_points(0.5)]))?;
@@ -261,13 +271,23 @@ impl Picture {
         }
         // Chart and arrows are drawn anew, ever more rarely, so that the work stays in proportion to the measurements.
         let count = self.measured.len();
-        if count > 0 && (count <= BLOCK || count.is_multiple_of(count / (BLOCK / 2))) {
-            let scale = self.arrows(stream, "before", &self.measured, |r| &r.nominal, [BEFORE, BEFORE_HELD_OUT])?;
-            self.log_scales(stream, &[scale])?;
-            self.log_errors(stream, &self.measured, false)?;
+        self.stale = true;
+        if count <= BLOCK || count.is_multiple_of(count / (BLOCK / 2)) {
+            self.catch_up(stream)?;
         }
         self.summary.measured(measurement);
         Ok(())
+    }
+
+    /// Draws what was put off: to be called after the last event.
+    pub(super) fn catch_up(&mut self, stream: &RecordingStream) -> RecordingStreamResult<()> {
+        if !self.stale || self.measured.is_empty() {
+            return Ok(());
+        }
+        self.stale = false;
+        let scale = self.arrows(stream, "before", &self.measured, |r| &r.nominal, [BEFORE, BEFORE_HELD_OUT])?;
+        self.log_scales(stream, &[scale])?;
+        self.log_errors(stream, &self.measured, false)
     }
 
     fn identified(&mut self, stream: &RecordingStream, identified: &Identification) -> RecordingStreamResult<()> {
@@ -279,13 +299,14 @@ impl Picture {
             self.log_scales(stream, &scales)?;
         }
         self.log_errors(stream, residuals, true)?;
+        self.stale = false;
         self.summary.identified(identified, &scales);
         Ok(())
     }
 
     /// Charts of the error of each configuration; `after`: those of the identified model too.
     fn log_errors(&self, stream: &RecordingStream, residuals: &[Residual], after: bool) -> RecordingStreamResult<()> {
-        let kinds: [(&str, [u8; 3], Role, fn(&Residual) -> &[f64; 6]); 4] = [
+        let kinds: [(&str, [u8; 3], Role, Vector); 4] = [
             ("before", BEFORE, Role::Fit, |r| &r.nominal),
             ("before, held out", BEFORE_HELD_OUT, Role::HeldOut, |r| &r.nominal),
             ("after", FIT, Role::Fit, |r| &r.identified),
@@ -317,11 +338,11 @@ impl Picture {
         stream: &RecordingStream,
         name: &str,
         residuals: &[Residual],
-        vector: fn(&Residual) -> &[f64; 6],
+        vector: Vector,
         [fit, held_out]: [[u8; 3]; 2],
     ) -> RecordingStreamResult<String> {
         let mean = residuals.iter().map(|r| length(&vector(r)[..3])).sum::<f64>() / residuals.len().max(1) as f64;
-        let scale = if mean > 0.0 && mean.is_finite() { round(0.09 * self.body.stretch / mean) } else { 1.0 };
+        let scale = if mean > 0.0 && mean.is_finite() { round(0.1 * self.body.stretch / mean) } else { 1.0 };
         let vectors = residuals.iter().map(|r| {
             let v = vector(r);
             [v[0], v[1], v[2]].map(|x| (x * scale) as f32)
@@ -330,7 +351,7 @@ impl Picture {
         let arrows = Arrows3D::from_vectors(vectors)
             .with_origins(residuals.iter().map(|r| r.position_m.map(|x| x as f32)))
             .with_colors(colours)
-            .with_radii([self.size(0.0035)]);
+            .with_radii([self.size(0.0045)]);
         stream.log(format!("world/residuals/{name}"), &arrows)?;
         Ok(format!("{name}: arrows ×{scale}, 10 cm = {}", metres(0.1 / scale)))
     }

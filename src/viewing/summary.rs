@@ -51,7 +51,8 @@ impl Summary {
             design.rejections,
             design.indexes.rank,
         );
-        let rows: [(&str, fn(&Indexes) -> f64); 9] = [
+        type Of = fn(&Indexes) -> f64;
+        let rows: [(&str, Of); 9] = [
             ("**O_C**", |i| i.comprehensive),
             ("O1", |i| i.o1),
             ("O2", |i| i.o2),

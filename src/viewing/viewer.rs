@@ -21,8 +21,6 @@ const CONNECT: Duration = Duration::from_secs(1);
 const STALL: Duration = Duration::from_secs(2);
 /// How long the end of a run waits for a viewer to take the rest.
 const FINISH: Duration = Duration::from_secs(5);
-/// The same for a viewer that was just started and may not be up yet.
-const FINISH_SPAWNED: Duration = Duration::from_secs(15);
 /// Events that may be on their way to the viewer.
 const QUEUE: usize = 64;
 
@@ -93,8 +91,7 @@ pub enum ViewerError {
 /// Where the picture goes.
 #[derive(Clone, Debug)]
 enum Destination {
-    Running(String),
-    Spawned(String),
+    Stream(String),
     File(PathBuf),
 }
 
@@ -102,15 +99,14 @@ impl Destination {
     /// How long the end of the run may wait; files are waited for.
     fn patience(&self) -> Option<Duration> {
         match self {
-            Destination::Running(_) => Some(FINISH),
-            Destination::Spawned(_) => Some(FINISH_SPAWNED),
+            Destination::Stream(_) => Some(FINISH),
             Destination::File(_) => None,
         }
     }
 
     fn failed(&self, reason: String) -> ViewerError {
         match self {
-            Destination::Running(url) | Destination::Spawned(url) => ViewerError::Lost { url: url.clone() },
+            Destination::Stream(url) => ViewerError::Lost { url: url.clone() },
             Destination::File(path) => ViewerError::Write { path: path.clone(), reason },
         }
     }
@@ -142,18 +138,18 @@ pub fn open(target: &Target, arm: &Arm, name: &str) -> Result<Option<Viewer>, Vi
             }
             let url = rerun::DEFAULT_CONNECT_URL.to_owned();
             let uri = proxy_uri(&url)?;
-            (Destination::Running(url), Box::new(GrpcSink::new(uri)))
+            (Destination::Stream(url), Box::new(GrpcSink::new(uri)))
         }
         Target::Connect(url) => {
             let url = url.as_deref().map_or_else(|| rerun::DEFAULT_CONNECT_URL.to_owned(), full_url);
             let uri = proxy_uri(&url)?;
             probe(&uri, &url)?;
-            (Destination::Running(url), Box::new(GrpcSink::new(uri)))
+            (Destination::Stream(url), Box::new(GrpcSink::new(uri)))
         }
         Target::Spawn => {
             let url = spawn()?;
             let uri = proxy_uri(&url)?;
-            (Destination::Spawned(url), Box::new(GrpcSink::new(uri)))
+            (Destination::Stream(url), Box::new(GrpcSink::new(uri)))
         }
         Target::File(path) => {
             let sink =
@@ -206,9 +202,12 @@ fn spawn() -> Result<String, ViewerError> {
     if !is_on_path("rerun") {
         return Err(ViewerError::NotInstalled);
     }
-    let options = rerun::SpawnOptions { hide_welcome_screen: true, ..Default::default() };
-    let started = rerun::spawn(&options).map_err(|error| ViewerError::Spawn(error.to_string()))?;
-    Ok(format!("rerun+http://127.0.0.1:{}/proxy", started.port))
+    let options = rerun::SpawnOptions { hide_welcome_screen: true, wait_for_bind: true, ..Default::default() };
+    rerun::spawn(&options).map_err(|error| ViewerError::Spawn(error.to_string()))?;
+    if !listens(&default, CONNECT) {
+        return Err(ViewerError::Spawn("it ended or does not listen; is there a screen it can open a window on?".to_owned()));
+    }
+    Ok(rerun::DEFAULT_CONNECT_URL.to_owned())
 }
 
 fn is_on_path(program: &str) -> bool {
@@ -251,8 +250,7 @@ impl Viewer {
     #[must_use]
     pub fn describe(&self) -> String {
         match &self.destination {
-            Destination::Running(url) => format!("streaming to the Rerun viewer at {url}"),
-            Destination::Spawned(url) => format!("streaming to the Rerun viewer started at {url}"),
+            Destination::Stream(url) => format!("streaming to the Rerun viewer at {url}"),
             Destination::File(path) => {
                 format!("writing the Rerun recording {path} (open it with `rerun {path}`)", path = path.display())
             }
@@ -339,6 +337,7 @@ fn show(
     while let Ok(event) = events.recv() {
         picture.take(&stream, &event).map_err(draw)?;
     }
+    picture.catch_up(&stream).map_err(draw)?;
     let patience = destination.patience().unwrap_or(Duration::MAX);
     let flushed = stream.flush_with_timeout(patience);
     // The file's footer is written when the stream goes.
