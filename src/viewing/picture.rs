@@ -47,8 +47,6 @@ const GOOD: [u8; 3] = [104, 160, 214];
 const PERSONAL: [u8; 3] = [96, 112, 140];
 const CURVES: [[u8; 3]; 6] = [AMBER, [110, 170, 230], [90, 200, 170], [200, 130, 220], [230, 120, 120], [170, 180, 120]];
 
-/// How long rows are collected before they are sent.
-const BATCH: Duration = Duration::from_millis(100);
 /// Measured points that share an entity: growing entities of this size keep what is sent in proportion to what is measured.
 const BLOCK: usize = 64;
 /// Chosen configurations drawn as lines; more would hide the rest.
@@ -90,16 +88,21 @@ impl Picture {
         })
     }
 
-    /// Opens the stream of the run that begins with `first`, with what stands still in it and its layout.
-    pub(super) fn begin(&mut self, first: &Event, sink: Box<dyn LogSink>) -> RecordingStreamResult<RecordingStream> {
+    /// Opens the stream of the run that begins with `first`, with what stands still in it and its layout. Rows are
+    /// collected for `batch` before they are sent.
+    pub(super) fn begin(
+        &mut self,
+        first: &Event,
+        sink: Box<dyn LogSink>,
+        batch: Duration,
+    ) -> RecordingStreamResult<RecordingStream> {
         let command = match first {
             Event::Start(start) => start.command.as_str(),
             _ => "",
         };
         let builder = RecordingStreamBuilder::new(APPLICATION).enabled(true).recording_id(self.recording_id(first));
         let (_, info, _, _, hooks, _) = builder.into_args();
-        // The SDK's own choice for viewers sends every row alone, which costs ten times the memory there.
-        let batching = ChunkBatcherConfig { flush_tick: BATCH, ..ChunkBatcherConfig::DEFAULT };
+        let batching = ChunkBatcherConfig { flush_tick: batch, ..ChunkBatcherConfig::DEFAULT };
         // Without Rerun's own properties: they hold the hour at which the picture was made.
         let stream = RecordingStream::new(info, None, Some(batching), hooks, sink)?;
         stream.set_log_time_enabled(false);

@@ -104,6 +104,15 @@ impl Destination {
         }
     }
 
+    /// How long rows are collected before they are sent. Many small parcels cost a viewer memory and make a file slow to load;
+    /// at the SDK's own choice for viewers, every row is one.
+    fn batch(&self) -> Duration {
+        match self {
+            Destination::Stream(_) => Duration::from_millis(100),
+            Destination::File(_) => Duration::from_secs(10),
+        }
+    }
+
     fn failed(&self, reason: String) -> ViewerError {
         match self {
             Destination::Stream(url) => ViewerError::Lost { url: url.clone() },
@@ -332,7 +341,7 @@ fn show(
 ) -> Result<(), ViewerError> {
     let draw = |error: rerun::RecordingStreamError| ViewerError::Draw(error.to_string());
     let Ok(first) = events.recv() else { return Ok(()) };
-    let stream = picture.begin(&first, sink).map_err(draw)?;
+    let stream = picture.begin(&first, sink, destination.batch()).map_err(draw)?;
     picture.take(&stream, &first).map_err(draw)?;
     while let Ok(event) = events.recv() {
         picture.take(&stream, &event).map_err(draw)?;
