@@ -33,6 +33,16 @@ const BEST: [(&str, NumericType); 8] = [
     ("alpha", NumericType::Uint8),
 ];
 
+const DOT: [(&str, NumericType); 7] = [
+    ("x", NumericType::Float32),
+    ("y", NumericType::Float32),
+    ("z", NumericType::Float32),
+    ("red", NumericType::Uint8),
+    ("green", NumericType::Uint8),
+    ("blue", NumericType::Uint8),
+    ("alpha", NumericType::Uint8),
+];
+
 const RESIDUAL: [(&str, NumericType); 12] = [
     ("x", NumericType::Float64),
     ("y", NumericType::Float64),
@@ -138,6 +148,16 @@ pub(super) fn best(points: impl Iterator<Item = [f64; 3]>, timestamp: Timestamp,
         data.extend([255, 120, 40, 255]);
     }
     cloud(&BEST, timestamp, frame_id, data)
+}
+
+/// Points that carry nothing but a colour.
+pub(super) fn dots(dots: &[super::skeleton::Dot], timestamp: Timestamp, frame_id: &str) -> PointCloud {
+    let mut data = Vec::with_capacity(dots.len() * 16);
+    for (point, colour) in dots {
+        point.iter().for_each(|coordinate| data.extend(coordinate.to_le_bytes()));
+        data.extend(colour);
+    }
+    cloud(&DOT, timestamp, frame_id, data)
 }
 
 /// Measured points with the residual vector that `choose` picks, coloured by its length over `longest` (m).

@@ -10,6 +10,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::event::{Event, Start};
+use super::skeleton::Skeleton;
 use super::topic::Topic;
 use super::{cloud, json};
 use crate::arm::{Arm, Fixture, Geometry, Shape};
@@ -66,6 +67,7 @@ pub struct Encoder {
     nominal: ChainAt,
     /// Frame in which poses and points are given: the chain's first.
     root: String,
+    skeleton: Skeleton,
     frame_names: Vec<String>,
     event: u32,
     now_ns: u64,
@@ -82,6 +84,7 @@ impl Encoder {
         Encoder {
             nominal: arm.chain.at_nominal(),
             root: root(&arm.chain),
+            skeleton: Skeleton::new(arm),
             arm: arm.clone(),
             frame_names,
             event: 0,
@@ -140,7 +143,9 @@ impl Encoder {
     fn start(&self, start: &Start, messages: &mut Messages) -> Result<(), EncodeError> {
         messages.json(Topic::Run, start)?;
         messages.protobuf(Topic::Shapes, &self.shapes());
-        messages.protobuf(Topic::Transforms, &self.transforms(&vec![0.0; self.arm.joint_count()]));
+        let zero = vec![0.0; self.arm.joint_count()];
+        messages.protobuf(Topic::Transforms, &self.transforms(&zero));
+        self.arm_points(&zero, None, messages);
         // Rerun complains of clouds whose frame it has not been told yet, however late they appear.
         let time = timestamp(self.now_ns);
         messages.protobuf(Topic::SwarmEndPoints, &cloud::no_end_points(time, &self.root));
@@ -182,6 +187,8 @@ impl Encoder {
             position: Some(Vector3 { x, y, z }),
             orientation: Some(Quaternion { x: qx, y: qy, z: qz, w: qw }),
         };
+        let attitude = nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(qw, qx, qy, qz));
+        self.arm_points(&measurement.joints, Some(&Pose::from_parts([x, y, z].into(), attitude)), messages);
         messages.protobuf(Topic::PoseMeasured, &self.pose_in_frame(measured));
         messages.protobuf(Topic::PoseNominal, &self.pose_in_frame(pose(&self.nominal.forward(&measurement.joints))));
         self.readings.insert(measurement.index, measurement.joints.clone());
@@ -205,6 +212,11 @@ impl Encoder {
             messages.protobuf(Topic::PosesPredicted, &self.poses_in_frame(poses));
         }
         Ok(())
+    }
+
+    fn arm_points(&self, joints: &[f64], measured: Option<&Pose>, messages: &mut Messages) {
+        let dots = self.skeleton.dots(&self.nominal.frames(joints), measured);
+        messages.protobuf(Topic::ArmPoints, &cloud::dots(&dots, timestamp(self.now_ns), &self.root));
     }
 
     fn check_joints(&self, topic: Topic, configurations: &[Vec<f64>]) -> Result<(), EncodeError> {

@@ -13,6 +13,7 @@ pub mod write;
 
 mod cloud;
 mod json;
+mod skeleton;
 #[cfg(test)]
 mod tests;
 

@@ -12,6 +12,9 @@ pub enum Topic {
     Run,
     /// Shapes of links and fixtures, in link frames.
     Shapes,
+    /// The arm's surfaces, its frames' axes and the measured pose's as coloured points, for viewers that draw clouds only: at zero,
+    /// then at each measured configuration (nominal arm).
+    ArmPoints,
     /// Link frames of the nominal arm: at zero, then at the joint readings of each measured configuration.
     Transforms,
     /// An iteration of the swarm without its end points.
@@ -55,9 +58,10 @@ pub struct Schema {
 
 impl Topic {
     /// Every topic, in the order of a run.
-    pub const ALL: [Topic; 16] = [
+    pub const ALL: [Topic; 17] = [
         Topic::Run,
         Topic::Shapes,
+        Topic::ArmPoints,
         Topic::Transforms,
         Topic::Swarm,
         Topic::SwarmEndPoints,
@@ -80,6 +84,7 @@ impl Topic {
         match self {
             Topic::Run => "/run",
             Topic::Shapes => "/arm/shapes",
+            Topic::ArmPoints => "/arm/points",
             Topic::Transforms => "/tf",
             Topic::Swarm => "/design/swarm",
             Topic::SwarmEndPoints => "/design/swarm/end_points",
@@ -120,9 +125,11 @@ impl Topic {
             Topic::Identification => "kincal.Identification",
             Topic::Shapes => "foxglove.SceneUpdate",
             Topic::Transforms => "foxglove.FrameTransforms",
-            Topic::SwarmEndPoints | Topic::BestEndPoints | Topic::ResidualsBefore | Topic::ResidualsAfter => {
-                "foxglove.PointCloud"
-            }
+            Topic::ArmPoints
+            | Topic::SwarmEndPoints
+            | Topic::BestEndPoints
+            | Topic::ResidualsBefore
+            | Topic::ResidualsAfter => "foxglove.PointCloud",
             Topic::Chosen | Topic::PosesPredicted => "foxglove.PosesInFrame",
             Topic::PoseMeasured | Topic::PoseNominal => "foxglove.PoseInFrame",
             Topic::Log => "foxglove.Log",
