@@ -1,6 +1,5 @@
 //! Arguments of every command.
 
-use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -36,8 +35,8 @@ pub(crate) struct Global {
     #[arg(long, global = true, value_name = "N")]
     pub(crate) seed: Option<u64>,
     /// Number of threads (the result does not depend on it)
-    #[arg(long, global = true, value_name = "N")]
-    pub(crate) threads: Option<NonZeroUsize>,
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(crate) threads: Option<u16>,
     /// No progress bars, no notes
     #[arg(long, short, global = true)]
     pub(crate) quiet: bool,
@@ -116,10 +115,10 @@ pub(crate) struct IdentifyOptions {
     #[arg(long, value_name = "LINK")]
     pub(crate) tip_link: Option<String>,
     /// Declared position noise of a table's sensor, one sigma per axis
-    #[arg(long, value_name = "UM", default_value_t = 20.0)]
+    #[arg(long, value_name = "UM", default_value_t = 20.0, allow_negative_numbers = true)]
     pub(crate) position_noise_um: f64,
     /// Declared attitude noise of a table's sensor, one sigma per axis
-    #[arg(long, value_name = "DEG", default_value_t = 0.005)]
+    #[arg(long, value_name = "DEG", default_value_t = 0.005, allow_negative_numbers = true)]
     pub(crate) attitude_noise_deg: f64,
     /// Print every identifiable combination
     #[arg(long)]
@@ -140,7 +139,7 @@ pub(crate) struct ReplayOptions {
 
 #[derive(Debug, Args)]
 pub(crate) struct ExportOptions {
-    /// Scene (.toml), recording (.mcap) or URDF
+    /// Scene (.toml) or recording (.mcap)
     pub(crate) input: PathBuf,
     /// Format
     #[arg(long, value_enum)]
@@ -169,8 +168,8 @@ pub(crate) struct ReproduceOptions {
     #[arg(long, value_name = "SCENE", default_value = "scenes/paper.toml")]
     pub(crate) arm: PathBuf,
     /// Calibrations per cell of the table
-    #[arg(long, value_name = "N", default_value = "20")]
-    pub(crate) trials: NonZeroUsize,
+    #[arg(long, value_name = "N", default_value = "20", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub(crate) trials: u32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

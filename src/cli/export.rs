@@ -1,6 +1,6 @@
 //! `kincal export`: a robot or measurements in another format.
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use serde_json::json;
 
 use super::Outcome;
@@ -10,18 +10,17 @@ use super::output;
 use crate::kinematics::urdf;
 use crate::measurement::{Measurement, table};
 use crate::recording::event::Event;
-use crate::recording::truth_file::write_whole;
 use crate::{recording, scene};
 
 pub(crate) fn command(global: &Global, options: &ExportOptions) -> anyhow::Result<Outcome> {
     let path = &options.input;
     let (extension, text) = if is_recording(path) { from_recording(global, options)? } else { from_scene(options)? };
-    std::fs::create_dir_all(&global.out).with_context(|| format!("creating {}; choose another folder with --out", global.out.display()))?;
     let written = global.out.join(format!("{}.{extension}", input_stem(path, "")));
+    output::check_target(&written)?;
     if written.exists() && std::fs::canonicalize(&written)? == std::fs::canonicalize(path)? {
         bail!("{} would overwrite its own input; choose another folder with --out", written.display());
     }
-    write_whole(&written, text.as_bytes()).with_context(|| format!("writing {}", written.display()))?;
+    output::write(&written, &text)?;
     output::show(global, &written.display().to_string())?;
     output::show_json(global, &json!({ "written": written }))?;
     Ok(Outcome::Good)
@@ -29,6 +28,9 @@ pub(crate) fn command(global: &Global, options: &ExportOptions) -> anyhow::Resul
 
 fn from_scene(options: &ExportOptions) -> anyhow::Result<(&'static str, String)> {
     let path = &options.input;
+    if path.extension().is_some_and(|extension| extension == "urdf" || extension == "csv") {
+        bail!("{}: give a scene (.toml) or a recording (.mcap)", path.display());
+    }
     let file = scene::read(path)?;
     match options.to {
         Format::Urdf => Ok(("urdf", urdf::export(&file.scene.arm)?)),

@@ -14,7 +14,6 @@ use crate::identification::identify;
 use crate::kinematics::urdf;
 use crate::measurement::{Measurement, Role, Sensor, table};
 use crate::recording::event::{Event, Listener};
-use crate::recording::truth_file::write_whole;
 use crate::scene::{self, SceneFile, Weights};
 use crate::{recording, report, session};
 
@@ -23,6 +22,7 @@ pub(crate) fn command(global: &Global, options: &IdentifyOptions) -> anyhow::Res
 }
 
 fn from_recording(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outcome> {
+    no_links(options, "a recording carries its own nominal arm; leave it out")?;
     ensure!(
         options.robot.is_none(),
         "--robot {}: a recording carries its own nominal arm; give --robot with a table (.csv) only",
@@ -47,8 +47,13 @@ fn from_table(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outc
     let Some(robot) = &options.robot else {
         bail!("{} is a table: give its nominal robot with --robot FILE (a URDF or a scene)", options.input.display());
     };
-    for (name, value) in [("--position-noise-um", options.position_noise_um), ("--attitude-noise-deg", options.attitude_noise_deg)] {
-        ensure!(value.is_finite() && value > 0.0, "{name} {value}: a positive number is needed");
+    if robot.extension().is_some_and(|extension| extension == "toml") {
+        no_links(options, "the arm of a scene is taken whole; leave it out or give a URDF")?;
+    }
+    for (name, value) in
+        [("--position-noise-um", options.position_noise_um), ("--attitude-noise-deg", options.attitude_noise_deg)]
+    {
+        ensure!((1e-6..=1e6).contains(&value), "{name} {value}: a positive number is needed, from 0.000001 to 1000000");
     }
     let nominal = robot_of(robot, options)?;
     let measurements = measurements_of(&options.input, nominal.joint_count(), global)?;
@@ -85,7 +90,7 @@ fn conclude(
     let values: Vec<f64> = identification.parameters.iter().map(|parameter| parameter.identified).collect();
     let path = global.out.join(format!("{stem}.urdf"));
     let text = urdf::export_with(arm, &values)?;
-    write_whole(&path, text.as_bytes()).with_context(|| format!("writing {}", path.display()))?;
+    output::write(&path, &text)?;
     output::show(global, &report::identification(identification))?;
     if options.parameters {
         output::show(global, &report::combinations(identification))?;
@@ -100,7 +105,7 @@ fn conclude(
         map.insert("calibrated_urdf".to_owned(), serde_json::to_value(&path)?);
     }
     output::show_json(global, &object)?;
-    Ok(if identification.converged { Outcome::Good } else { Outcome::Bad })
+    Ok(output::judged(identification))
 }
 
 /// The scene and the measurements of a recording.
@@ -127,7 +132,11 @@ pub(crate) fn recorded(global: &Global, path: &Path, partial: bool) -> anyhow::R
             _ => None,
         })
         .collect();
-    ensure!(!measurements.is_empty(), "{} holds no measurements; make some with `kincal measure` or `kincal run`", path.display());
+    ensure!(
+        !measurements.is_empty(),
+        "{} holds no measurements; make some with `kincal measure` or `kincal run`",
+        path.display()
+    );
     Ok((file, measurements))
 }
 
@@ -197,6 +206,14 @@ fn robot_of(path: &Path, options: &IdentifyOptions) -> anyhow::Result<Arm> {
         return Ok(scene::read(path)?.scene.arm);
     }
     Ok(urdf::read(path, options.base_link.as_deref(), options.tip_link.as_deref())?.arm)
+}
+
+/// Refuses `--base-link` and `--tip-link` where they would do nothing.
+fn no_links(options: &IdentifyOptions, why: &str) -> anyhow::Result<()> {
+    for (name, link) in [("--base-link", &options.base_link), ("--tip-link", &options.tip_link)] {
+        ensure!(link.is_none(), "{name} {}: {why}", link.as_deref().unwrap_or_default());
+    }
+    Ok(())
 }
 
 pub(crate) fn is_recording(path: &Path) -> bool {

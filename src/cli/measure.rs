@@ -11,7 +11,7 @@ use crate::{recording, session};
 
 pub(crate) fn command(global: &Global, options: &MeasureOptions) -> anyhow::Result<Outcome> {
     let file = output::scene(global, &options.scene)?;
-    let injected = output::injected(&file)?;
+    let injected = output::injected(&file, &options.scene.scene)?;
     let scene = &file.scene;
     let designed = recording::read::read(&options.design)?;
     let outcome = designed
@@ -35,11 +35,12 @@ pub(crate) fn command(global: &Global, options: &MeasureOptions) -> anyhow::Resu
     }
 
     let stem = output::stem(global, &file, "-measure");
+    let truth_path = global.out.join(format!("{stem}.truth.toml"));
+    output::check_target(&truth_path)?;
     let mut audience = Audience::open(global, &scene.arm, Some(&stem), &stem)?;
     session::start("measure", &file.public_toml()?, &mut audience)?;
     let (measurements, truth) = session::measure_design(scene, injected, &outcome.configurations, &mut audience)?;
     let recording = audience.finish()?;
-    let truth_path = global.out.join(format!("{stem}.truth.toml"));
     super::run::truth_file(&file, &truth)?.write(&truth_path)?;
 
     let settled = truth.poses.iter().filter(|pose| pose.settled).count();
@@ -57,6 +58,9 @@ pub(crate) fn command(global: &Global, options: &MeasureOptions) -> anyhow::Resu
     if let Some(recording) = &recording {
         output::show(global, &format!("Recording   {}\nTruth       {}", recording.display(), truth_path.display()))?;
     }
-    output::show_json(global, &json!({ "poses": measurements.len(), "settled": settled, "recording": recording, "truth": truth_path }))?;
+    output::show_json(
+        global,
+        &json!({ "poses": measurements.len(), "settled": settled, "recording": recording, "truth": truth_path }),
+    )?;
     Ok(if settled == measurements.len() { Outcome::Good } else { Outcome::Bad })
 }

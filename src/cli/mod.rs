@@ -12,8 +12,10 @@ mod replay;
 mod reproduce;
 mod run;
 
+use std::io::Write;
 use std::process::ExitCode;
 
+use anyhow::ensure;
 use clap::Parser;
 
 use arguments::{Arguments, Command};
@@ -41,17 +43,37 @@ pub fn main() -> ExitCode {
         Ok(Outcome::Good) => ExitCode::SUCCESS,
         Ok(Outcome::Bad) => ExitCode::from(1),
         Err(error) => {
-            eprintln!("kincal: {error:#}");
+            // Where even stderr is full, the exit code must do.
+            let _ = writeln!(std::io::stderr().lock(), "kincal: {}", in_full(&error));
             ExitCode::from(2)
         }
     }
 }
 
+/// The error with its causes, each said once: many errors tell their cause in their own words.
+fn in_full(error: &anyhow::Error) -> String {
+    error.chain().fold(String::new(), |text, cause| {
+        let cause = cause.to_string();
+        match text.as_str() {
+            "" => cause,
+            text if text.contains(&cause) => text.to_owned(),
+            text => format!("{text}: {cause}"),
+        }
+    })
+}
+
 fn dispatch(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let global = &arguments.global;
     if let Some(threads) = global.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
+        rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global()?;
     }
+    if let (Some(seed), Command::Identify(_) | Command::Replay(_) | Command::Export(_)) = (global.seed, &arguments.command) {
+        ensure!(
+            false,
+            "--seed {seed}: this command draws nothing; leave it out, or give it to run, design, measure or reproduce"
+        );
+    }
+    output::check_rerun(global)?;
     match &arguments.command {
         Command::Run(options) => run::command(global, options),
         Command::Design(options) => design::command(global, options),

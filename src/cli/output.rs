@@ -1,14 +1,17 @@
 //! What commands share: scenes with overrides, the file names of a run, listeners, and where text goes.
 
 use std::io::{IsTerminal, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use super::Outcome;
 use super::arguments::{Global, SceneOptions};
 use crate::arm::Arm;
+use crate::identification::outcome::Identification;
 use crate::recording::event::{Event, Listener, ListenerError};
+use crate::recording::truth_file::write_whole;
 use crate::recording::write::Recorder;
 use crate::scene::{Injected, SceneFile};
 
@@ -19,19 +22,23 @@ pub(crate) fn scene(global: &Global, options: &SceneOptions) -> anyhow::Result<S
         let Some((key, value)) = assignment.split_once('=') else {
             bail!("--set {assignment}: KEY=VALUE is needed, such as design.count=20");
         };
-        file.set(key.trim(), value.trim()).with_context(|| format!("--set {assignment}"))?;
+        file.set(key.trim(), value.trim())?;
     }
     if let Some(seed) = global.seed {
-        file.set_seed(seed).context("--seed")?;
+        file.set_seed(seed)?;
     }
     Ok(file)
 }
 
 /// The hidden part that only a simulated measurement needs.
-pub(crate) fn injected(file: &SceneFile) -> anyhow::Result<&Injected> {
-    file.injected.as_ref().context(
-        "the scene has no [injected] section: there is nothing to simulate; add one, or measure a real arm and use `kincal identify`",
-    )
+pub(crate) fn injected<'a>(file: &'a SceneFile, path: &Path) -> anyhow::Result<&'a Injected> {
+    file.injected.as_ref().with_context(|| {
+        format!(
+            "{}: the scene has no [injected] section: there is nothing to simulate; add one, or measure a real arm and use \
+             `kincal identify`",
+            path.display()
+        )
+    })
 }
 
 /// Stem of a run's files: the scene's name, with the seed where the command line changed it.
@@ -43,7 +50,7 @@ pub(crate) fn stem(global: &Global, file: &SceneFile, suffix: &str) -> String {
 /// A note for people: on stderr, and not at all if they want quiet.
 pub(crate) fn note(global: &Global, text: &str) {
     if !global.quiet {
-        eprintln!("{text}");
+        let _ = writeln!(std::io::stderr().lock(), "{text}");
     }
 }
 
@@ -63,6 +70,36 @@ pub(crate) fn print(text: &str) -> anyhow::Result<()> {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         other => Ok(other?),
     }
+}
+
+/// Refuses a target for `--rerun` that cannot be, whether or not the command shows anything.
+pub(crate) fn check_rerun(global: &Global) -> anyhow::Result<()> {
+    #[cfg(feature = "viewer")]
+    let _: crate::viewing::Target = global.rerun.parse()?;
+    #[cfg(not(feature = "viewer"))]
+    if !["auto", "off"].contains(&global.rerun.as_str()) {
+        bail!("--rerun {}: this kincal was built without the viewer; build it with the default features", global.rerun);
+    }
+    Ok(())
+}
+
+/// Refuses, before anything is computed, to write where a folder stands.
+pub(crate) fn check_target(path: &Path) -> anyhow::Result<()> {
+    ensure!(!path.is_dir(), "{} is a folder: remove it, or choose another folder for what is written with --out", path.display());
+    Ok(())
+}
+
+/// Writes a small file whole, and its folder where there is none.
+pub(crate) fn write(path: &Path, text: &str) -> anyhow::Result<()> {
+    let folder = path.parent().map_or(Ok(()), std::fs::create_dir_all);
+    folder
+        .and_then(|()| write_whole(path, text.as_bytes()))
+        .with_context(|| format!("cannot write {}; choose another folder with --out", path.display()))
+}
+
+/// How well an identification ended. One that converged on nothing tells nothing.
+pub(crate) fn judged(identification: &Identification) -> Outcome {
+    if identification.converged && identification.rank > 0 { Outcome::Good } else { Outcome::Bad }
 }
 
 /// Everyone who listens to a run: the recording, the viewer, the progress bar.
@@ -85,12 +122,7 @@ impl Audience {
             viewer
         };
         #[cfg(not(feature = "viewer"))]
-        {
-            let _ = name;
-            if !["auto", "off"].contains(&global.rerun.as_str()) {
-                bail!("--rerun {}: this kincal was built without the viewer; build it with the default features", global.rerun);
-            }
-        }
+        let _ = name;
         let recorder = stem.map(|stem| Recorder::create(&global.out, stem, arm)).transpose()?;
         let visible = !global.quiet && std::io::stderr().is_terminal();
         Ok(Audience {
@@ -102,13 +134,25 @@ impl Audience {
     }
 
     /// Ends the progress bar, the viewer and the recording; the path of the recording.
-    pub(crate) fn finish(self) -> anyhow::Result<Option<PathBuf>> {
+    pub(crate) fn finish(mut self) -> anyhow::Result<Option<PathBuf>> {
         self.progress.bar.finish_and_clear();
+        // The recording first: whatever becomes of the viewer, it is worth keeping.
+        let recording = self.recorder.take().map(Recorder::finish).transpose()?;
         #[cfg(feature = "viewer")]
-        if let Some(viewer) = self.viewer {
+        if let Some(viewer) = self.viewer.take() {
             viewer.finish()?;
         }
-        Ok(self.recorder.map(Recorder::finish).transpose()?)
+        Ok(recording)
+    }
+}
+
+impl Drop for Audience {
+    fn drop(&mut self) {
+        // Dropped without an end: the command failed, and half a recording of a refused input helps nobody. A panic, like a
+        // killed process, leaves what it has.
+        if let Some(recorder) = self.recorder.take().filter(|_| !std::thread::panicking()) {
+            recorder.discard();
+        }
     }
 }
 

@@ -42,7 +42,7 @@ pub(crate) fn command(global: &Global, options: &ReplayOptions) -> anyhow::Resul
     let cut = recorded.cut.is_some();
     let new_truth = match recomputed {
         Ok(truth) => truth,
-        // A cut recording may end where too little was measured.
+        // A cut recording ends the repeated run; it may end where too little was measured.
         Err(_) if cut => None,
         Err(error) => return Err(error).with_context(|| format!("replaying {}", path.display())),
     };
@@ -76,8 +76,7 @@ pub(crate) fn command(global: &Global, options: &ReplayOptions) -> anyhow::Resul
         }),
     )?;
     if let Some(cut) = &recorded.cut {
-        eprintln!("kincal: {}: {cut}", path.display());
-        anyhow::bail!("{} is cut off: what is there was compared, the rest is lost; run the scene again for a whole recording", path.display());
+        anyhow::bail!("{cut}; only what is there was compared");
     }
     Ok(if identical { Outcome::Good } else { Outcome::Bad })
 }
@@ -90,6 +89,10 @@ struct Replayer {
 impl Listener for Replayer {
     fn take(&mut self, event: &Event) -> Result<(), ListenerError> {
         self.comparer.take(event)?;
+        if self.comparer.is_past_cut() {
+            // A swarm that was killed early would run to its end for nothing.
+            return Err(ListenerError("the recording ends here".to_owned()));
+        }
         self.audience.take(event)
     }
 }

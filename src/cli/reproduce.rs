@@ -12,10 +12,10 @@ pub(crate) fn command(global: &Global, options: &ReproduceOptions) -> anyhow::Re
     if let Some(seed) = global.seed {
         file.set_seed(seed)?;
     }
-    let injected = output::injected(&file)?;
+    let injected = output::injected(&file, &options.arm)?;
     match options.item {
         Item::CountError => {
-            let rows = experiments::count_error::run(&file.scene, injected, options.trials.get())?;
+            let rows = experiments::count_error::run(&file.scene, injected, options.trials as usize)?;
             output::show(global, &format!("{}\n{}", file.scene.arm_note, report::count_error(&rows)))?;
             output::show_json(global, &json!({ "item": "count-error", "arm": file.scene.arm.name, "rows": rows }))?;
         }

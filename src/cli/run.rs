@@ -6,28 +6,28 @@ use super::Outcome;
 use super::arguments::{Global, SceneOptions};
 use super::output::{self, Audience};
 use crate::kinematics::urdf;
-use crate::recording::truth_file::{TruthFile, write_whole};
+use crate::recording::truth_file::TruthFile;
 use crate::report;
 use crate::session;
 
 pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result<Outcome> {
     let file = output::scene(global, options)?;
-    let injected = output::injected(&file)?;
+    let injected = output::injected(&file, &options.scene)?;
     let scene = &file.scene;
     let stem = output::stem(global, &file, "");
     let urdf_text = urdf::export(&scene.arm)?;
+    let [truth_path, urdf_path, calibrated_path] =
+        ["truth.toml", "urdf", "calibrated.urdf"].map(|extension| global.out.join(format!("{stem}.{extension}")));
+    [&truth_path, &urdf_path, &calibrated_path].into_iter().try_for_each(|path| output::check_target(path))?;
 
     let mut audience = Audience::open(global, &scene.arm, Some(&stem), &stem)?;
     let run = session::run(scene, &file.public_toml()?, injected, &mut audience)?;
     let recording = audience.finish()?;
 
-    let truth_path = global.out.join(format!("{stem}.truth.toml"));
     truth_file(&file, &run.truth)?.write(&truth_path)?;
-    let urdf_path = global.out.join(format!("{stem}.urdf"));
-    write_whole(&urdf_path, urdf_text.as_bytes())?;
+    output::write(&urdf_path, &urdf_text)?;
     let calibrated: Vec<f64> = run.identification.parameters.iter().map(|parameter| parameter.identified).collect();
-    let calibrated_path = global.out.join(format!("{stem}.calibrated.urdf"));
-    write_whole(&calibrated_path, urdf::export_with(&scene.arm, &calibrated)?.as_bytes())?;
+    output::write(&calibrated_path, &urdf::export_with(&scene.arm, &calibrated)?)?;
 
     let parameter_count = scene.arm.chain.parameters.len();
     output::show(global, &format!("{}: {}\n{}\n", scene.name, scene.description, scene.arm_note))?;
@@ -58,7 +58,7 @@ pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result
             "calibrated_urdf": calibrated_path,
         }),
     )?;
-    Ok(if run.identification.converged { Outcome::Good } else { Outcome::Bad })
+    Ok(output::judged(&run.identification))
 }
 
 /// The truth file of a run of `file`.

@@ -23,7 +23,7 @@ pub struct Table {
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
     /// The file cannot be read.
-    #[error("{file}: {source}")]
+    #[error("cannot read {file}: {source}; give a table of measurements (.csv)")]
     Unreadable {
         /// Path.
         file: String,
@@ -41,6 +41,9 @@ pub enum TableError {
         message: String,
     },
 }
+
+/// Largest number, in the unit of its column, that is taken for meant. Times since 1970 in ms are smaller.
+const LARGEST: f64 = 1e13;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Column {
@@ -77,10 +80,8 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
         csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).flexible(true).from_reader(text.as_bytes());
     let header = reader.headers().map_err(|error| wrong(1, error.to_string()))?.clone();
     let header_line = header.position().map_or(1, csv::Position::line);
-    let columns = header
-        .iter()
-        .map(|name| column(name).map_err(|message| wrong(header_line, message)))
-        .collect::<Result<Vec<_>, _>>()?;
+    let columns =
+        header.iter().map(|name| column(name).map_err(|message| wrong(header_line, message))).collect::<Result<Vec<_>, _>>()?;
     let layout = Layout::new(&columns, &header).map_err(|message| wrong(header_line, message))?;
 
     let mut measurements: Vec<Measurement> = Vec::new();
@@ -104,7 +105,10 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
         };
         for ((column, text), name) in columns.iter().zip(record.iter()).zip(header.iter()) {
             let number = || match text.parse::<f64>() {
-                Ok(value) if value.is_finite() => Ok(value),
+                Ok(value) if value.abs() <= LARGEST => Ok(value),
+                Ok(value) if value.is_finite() => {
+                    Err(wrong(line, format!("`{name}` is `{text}`; at most {LARGEST} is allowed: check the number")))
+                }
                 _ => Err(wrong(line, format!("`{name}` is `{text}`; a finite number is needed"))),
             };
             match column {
@@ -196,7 +200,9 @@ impl Layout {
             Column::Joint { joint, .. } => Some(*joint),
             _ => None,
         })
-        .map_err(|missing| format!("joint columns must be q1, q2, … without a gap, each once: q{} is missing or doubled", missing + 1))?;
+        .map_err(|missing| {
+            format!("joint columns must be q1, q2, … without a gap, each once: q{} is missing or doubled", missing + 1)
+        })?;
         if joints == 0 {
             return Err("no joint columns; q1_rad, q2_rad, … (or _deg, _m, _mm) are needed".to_owned());
         }
@@ -220,7 +226,9 @@ impl Layout {
             Column::Temperature { sensor } => Some(*sensor),
             _ => None,
         })
-        .map_err(|missing| format!("temperature columns must be temp1_c, temp2_c, … without a gap: temp{}_c is missing", missing + 1))?;
+        .map_err(|missing| {
+            format!("temperature columns must be temp1_c, temp2_c, … without a gap: temp{}_c is missing", missing + 1)
+        })?;
         Ok(Layout { joints, sensors, attitude })
     }
 }

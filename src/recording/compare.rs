@@ -104,6 +104,12 @@ impl Comparer {
         self.recorded.start()
     }
 
+    /// Whether the repeated run has gone on where the recording is cut off: nothing that follows can be compared.
+    #[must_use]
+    pub fn is_past_cut(&self) -> bool {
+        self.extra > 0 && self.recorded.cut().is_some()
+    }
+
     /// Ends the comparison: what is left in the recording is missing in the repeated run.
     ///
     /// # Errors

@@ -88,7 +88,7 @@ impl fmt::Display for Cut {
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The file system refused.
-    #[error("cannot read {}: {source}", path.display())]
+    #[error("cannot read {}: {source}; check the path", path.display())]
     Input {
         /// The file.
         path: PathBuf,

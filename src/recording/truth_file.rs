@@ -4,8 +4,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::cell::truth::{TrueParameter, TruePose};
 use crate::cell::Truth;
+use crate::cell::truth::{TrueParameter, TruePose};
 
 /// The file as it stands: TOML, the scene's `[injected]` section first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -29,7 +29,7 @@ pub struct TruthFile {
 #[derive(Debug, thiserror::Error)]
 pub enum TruthFileError {
     /// Reading failed.
-    #[error("{file}: {source}")]
+    #[error("cannot read {file}: {source}; give the truth file (.truth.toml) of this run")]
     Unreadable {
         /// Path.
         file: String,
@@ -78,7 +78,7 @@ impl TruthFile {
     pub fn read(path: &Path) -> Result<TruthFile, TruthFileError> {
         let file = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|source| TruthFileError::Unreadable { file: file.clone(), source })?;
-        toml::from_str(&text).map_err(|error| TruthFileError::Foreign { file, reason: error.to_string() })
+        toml::from_str(&text).map_err(|error| TruthFileError::Foreign { file, reason: error.to_string().trim_end().to_owned() })
     }
 }
 
@@ -90,6 +90,10 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut partial = path.as_os_str().to_owned();
     partial.push(".partial");
     let partial = std::path::PathBuf::from(partial);
-    std::fs::write(&partial, bytes)?;
-    std::fs::rename(&partial, path)
+    let written = std::fs::write(&partial, bytes).and_then(|()| std::fs::rename(&partial, path));
+    if written.is_err() {
+        // The error that is told is the first one.
+        let _ = std::fs::remove_file(&partial);
+    }
+    written
 }

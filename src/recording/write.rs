@@ -78,6 +78,7 @@ pub struct Recorder {
     swarm_since_flush: usize,
     measurements_since_flush: usize,
     bytes_since_flush: usize,
+    output_failed: bool,
 }
 
 impl Recorder {
@@ -119,6 +120,7 @@ impl Recorder {
             swarm_since_flush: 0,
             measurements_since_flush: 0,
             bytes_since_flush: 0,
+            output_failed: false,
         })
     }
 
@@ -133,6 +135,23 @@ impl Recorder {
     /// # Errors
     /// If it cannot be written or holds numbers that are not finite.
     pub fn record(&mut self, event: &Event) -> Result<(), RecordError> {
+        let recorded = self.record_messages(event);
+        self.output_failed |= matches!(recorded, Err(RecordError::Output { .. } | RecordError::Format { .. }));
+        recorded
+    }
+
+    /// Gives the recording up and removes the partial file: the run was refused. Where it ended because nothing more could be
+    /// written, the file stays.
+    pub fn discard(self) {
+        let partial = (!self.output_failed).then(|| self.partial.clone());
+        drop(self);
+        if let Some(partial) = partial {
+            // Nothing to be done, and nothing lost, where it cannot be removed.
+            let _ = fs::remove_file(partial);
+        }
+    }
+
+    fn record_messages(&mut self, event: &Event) -> Result<(), RecordError> {
         for message in self.encoder.encode(event)? {
             self.bytes_since_flush += message.data.len();
             self.write(&message).map_err(|source| format(&self.partial, source))?;

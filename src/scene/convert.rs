@@ -105,11 +105,35 @@ fn positive(value: f64, key: &str) -> Checked<f64> {
     Err(Invalid::new(key, value.to_string(), "more than 0", "give a positive number"))
 }
 
-fn at_least(value: usize, least: usize, key: &str, remedy: &str) -> Checked<usize> {
-    if value >= least {
+/// A number of things: at least one, and no more than memory and patience allow.
+fn count(value: usize, most: usize, key: &str, remedy: &str) -> Checked<usize> {
+    if (1..=most).contains(&value) {
         return Ok(value);
     }
-    Err(Invalid::new(key, value.to_string(), format!("{least} or more"), remedy))
+    Err(Invalid::new(key, value.to_string(), format!("1 or more, {most} at most"), remedy))
+}
+
+fn at_most(value: f64, most: f64, key: &str) -> Checked<f64> {
+    if value <= most {
+        return Ok(value);
+    }
+    Err(Invalid::new(key, value.to_string(), format!("{most} at most"), "give a smaller number"))
+}
+
+/// A declared noise: none, or so much that its inverse square is a number to calculate with.
+fn declared_noise(value: f64, key: &str) -> Checked<f64> {
+    if value == 0.0 || value >= 1e-6 {
+        return Ok(value);
+    }
+    Err(Invalid::new(key, value.to_string(), "0, or 0.000001 or more", "give the noise of a sensor"))
+}
+
+/// Furthest that the arm may reach with every link stretched out, m: the workspace lies within.
+fn reach(arm: &Arm) -> f64 {
+    let lengths = arm.chain.parameters.iter().filter(|parameter| parameter.quantity == Quantity::Length);
+    let slides = arm.chain.joints.iter().filter(|joint| joint.kind == JointKind::Prismatic);
+    lengths.map(|length| length.nominal.abs()).sum::<f64>()
+        + slides.map(|joint| joint.lower.abs().max(joint.upper.abs())).sum::<f64>()
 }
 
 fn arm(file: &ArmToml) -> Checked<Arm> {
@@ -355,11 +379,11 @@ fn shape(file: &ShapeToml, key: &str) -> Checked<Shape> {
 fn sensor(file: &SensorToml) -> Checked<Sensor> {
     Ok(Sensor {
         position_in_base: point_from_mm(&file.position_mm),
-        position_sigma_m: metres_from_um(not_negative(file.position_noise_um, "sensor.position_noise_um")?),
+        position_sigma_m: metres_from_um(declared_noise(file.position_noise_um, "sensor.position_noise_um")?),
         position_sigma_per_m: metres_from_um(not_negative(file.position_noise_um_per_m, "sensor.position_noise_um_per_m")?),
         attitude_sigma_rad: file
             .attitude_noise_deg
-            .map(|degrees| not_negative(degrees, "sensor.attitude_noise_deg").map(f64::to_radians))
+            .map(|degrees| declared_noise(degrees, "sensor.attitude_noise_deg").map(f64::to_radians))
             .transpose()?,
         temperature_sigma_k: not_negative(file.temperature_noise_k, "sensor.temperature_noise_k")?,
     })
@@ -378,34 +402,51 @@ fn design(file: &DesignToml, arm: &Arm, sensor: &Sensor) -> Checked<DesignProble
         ));
     }
     let swarm = &file.swarm;
+    let step_m = metres_from_mm(positive(file.evenness_step_mm, "design.evenness_step_mm")?);
+    let (reach_m, most_steps) = (reach(arm), 300.0);
+    if step_m < 2.0 * reach_m / most_steps {
+        return Err(Invalid::new(
+            "design.evenness_step_mm",
+            file.evenness_step_mm.to_string(),
+            format!(
+                "{:.1} or more: the stretched arm reaches {reach_m:.1} m, and the grid has {most_steps} steps at most",
+                2e3 * reach_m / most_steps
+            ),
+            "give a larger step, or check the lengths of the arm",
+        ));
+    }
     let [least_inertia, most_inertia] = swarm.inertia;
-    if !(0.0 <= least_inertia && least_inertia <= most_inertia) {
+    if !(0.0 <= least_inertia && least_inertia <= most_inertia && most_inertia <= 10.0) {
         return Err(Invalid::new(
             "design.swarm.inertia",
             format!("[{least_inertia}, {most_inertia}]"),
-            "[ω_min, ω_max] with 0 ≤ ω_min ≤ ω_max",
+            "[ω_min, ω_max] with 0 ≤ ω_min ≤ ω_max ≤ 10",
             "put the smaller one first",
         ));
     }
     Ok(DesignProblem {
-        count: file.count,
+        count: count(file.count, 10_000, "design.count", "measure fewer configurations")?,
         method: match file.method {
             MethodToml::Pso => Method::Pso,
             MethodToml::Random => Method::Random,
         },
         swarm: Swarm {
-            particles: at_least(swarm.particles, 1, "design.swarm.particles", "give the swarm particles")?,
-            iterations: at_least(swarm.iterations, 1, "design.swarm.iterations", "or use method = \"random\"")?,
+            particles: count(swarm.particles, 1000, "design.swarm.particles", "give the swarm particles")?,
+            iterations: count(swarm.iterations, 1_000_000, "design.swarm.iterations", "or use method = \"random\"")?,
             inertia: swarm.inertia,
-            velocity_factor: positive(swarm.velocity_factor, "design.swarm.velocity_factor")?,
-            tau: positive(swarm.tau, "design.swarm.tau")?,
+            velocity_factor: at_most(
+                positive(swarm.velocity_factor, "design.swarm.velocity_factor")?,
+                100.0,
+                "design.swarm.velocity_factor",
+            )?,
+            tau: at_most(positive(swarm.tau, "design.swarm.tau")?, 1000.0, "design.swarm.tau")?,
         },
         evenness_domain: match file.evenness_domain {
             EvennessDomainToml::Reachable => EvennessDomain::Reachable,
             EvennessDomainToml::BoundingCube => EvennessDomain::BoundingCube,
         },
-        evenness_step_m: metres_from_mm(positive(file.evenness_step_mm, "design.evenness_step_mm")?),
-        random_sets: at_least(file.random_sets, 1, "design.random_sets", "the chosen set is compared with random ones")?,
+        evenness_step_m: step_m,
+        random_sets: count(file.random_sets, 1000, "design.random_sets", "the chosen set is compared with random ones")?,
     })
 }
 
@@ -420,7 +461,7 @@ fn plan(file: &PlanToml) -> Checked<Plan> {
         ));
     }
     Ok(Plan {
-        held_out_count: at_least(file.held_out_count, 1, "plan.held_out_count", "the reported error comes from these")?,
+        held_out_count: count(file.held_out_count, 100_000, "plan.held_out_count", "the reported error comes from these")?,
         held_out_exact: file.held_out_exact,
         seconds_per_pose: positive(file.seconds_per_pose, "plan.seconds_per_pose")?,
         reference_temperature_c,
@@ -545,7 +586,10 @@ fn noise(file: &NoiseToml) -> Checked<Noise> {
         not_negative(value, &key)
     };
     Ok(match file.kind {
-        NoiseKindToml::Declared => Noise::Declared { factor: not_negative(file.factor.unwrap_or(1.0), "injected.noise.factor")? },
+        NoiseKindToml::Declared => {
+            let key = "injected.noise.factor";
+            Noise::Declared { factor: at_most(not_negative(file.factor.unwrap_or(1.0), key)?, 1e6, key)? }
+        }
         NoiseKindToml::Uniform => Noise::Uniform {
             position_m: metres_from_mm(required(file.position_mm, "position_mm")?),
             attitude_rad: required(file.attitude_deg, "attitude_deg")?.to_radians(),

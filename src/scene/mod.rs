@@ -3,6 +3,7 @@
 mod convert;
 mod error;
 pub mod file;
+mod magnitude;
 mod reader;
 #[cfg(test)]
 mod tests;

@@ -8,6 +8,7 @@ use serde::de::DeserializeOwned;
 use super::convert;
 use super::error::{Invalid, Located, SceneError, in_our_words};
 use super::file::{InjectedOnlyToml, MethodToml, SceneToml, WeightsToml};
+use super::magnitude::too_large;
 use super::{Injected, Scene};
 use crate::arm::Arm;
 
@@ -47,6 +48,9 @@ pub fn parse(text: &str, origin: &str) -> Result<SceneFile, SceneError> {
 pub fn parse_injected(text: &str, origin: &str, arm: &Arm) -> Result<Injected, SceneError> {
     let located = Located::parse(text, origin)?;
     let toml: InjectedOnlyToml = deserialise(text, &located, origin)?;
+    if let Some(invalid) = toml::Value::try_from(&toml).ok().and_then(|value| too_large(&value, "")) {
+        return Err(located.error(invalid, origin));
+    }
     convert::injected(&toml.injected, arm).map_err(|invalid| located.error(invalid, origin))
 }
 
@@ -55,6 +59,10 @@ fn deserialise<T: DeserializeOwned>(text: &str, located: &Located<'_>, origin: &
 }
 
 fn validated(toml: SceneToml) -> Result<SceneFile, Invalid> {
+    // What TOML cannot write, such as a seed of 64 bits, is refused by name below.
+    if let Some(invalid) = toml::Value::try_from(&toml).ok().and_then(|value| too_large(&value, "")) {
+        return Err(invalid);
+    }
     let scene = convert::scene(&toml)?;
     let injected = toml.injected.as_ref().map(|injected| convert::injected(injected, &scene.arm)).transpose()?;
     Ok(SceneFile { scene, injected, toml })
@@ -154,7 +162,8 @@ impl SceneFile {
         }
         let assignment = format!("value = {value}");
         Located::parse(&assignment, &origin).map_err(|error| without_position(error, key))?;
-        let value = toml::from_str::<toml::Table>(&assignment).ok().and_then(|mut table| table.remove("value"));
+        let table = toml::from_str::<toml::Table>(&assignment).ok().filter(|table| table.len() == 1);
+        let value = table.and_then(|mut table| table.remove("value"));
         let mut root = toml::Value::try_from(&self.toml)?;
         let place = place(&mut root, key).map_err(|invalid| invalid.at(&origin, None))?;
         match (place, value) {
@@ -162,7 +171,9 @@ impl SceneFile {
                 table.insert(name, value);
             }
             (Place::Entry(entry), Some(value)) => *entry = value,
-            (_, None) => return Err(Invalid::new(key, assignment, "one TOML value", "quote texts").at(&origin, None)),
+            (_, None) => {
+                return Err(Invalid::new(key, assignment, "one TOML value", "give one value for one key").at(&origin, None));
+            }
         }
         let toml: SceneToml =
             root.try_into().map_err(|error: toml::de::Error| in_our_words(error.message(), key.to_owned()).at(&origin, None))?;
@@ -173,7 +184,7 @@ impl SceneFile {
     fn change(&mut self, key: &str, value: &impl Serialize, change: impl FnOnce(&mut SceneToml)) -> Result<(), SceneError> {
         let mut toml = self.toml.clone();
         change(&mut toml);
-        let shown = || toml::Value::try_from(value).map_or_else(|_| "…".to_owned(), |value| value.to_string());
+        let shown = || serde_json::to_string(value).unwrap_or_else(|_| "…".to_owned());
         *self = validated(toml).map_err(|invalid| invalid.at(&origin_of(key, &shown()), None))?;
         Ok(())
     }

@@ -13,6 +13,9 @@ use crate::arm::{Arm, Geometry, Inertial, Link, Shape};
 use crate::frames::Pose;
 use crate::kinematics::{Chain, Joint, JointKind, Step};
 
+/// Largest number of an origin, m or rad, that is taken for meant.
+const LARGEST: f64 = 1000.0;
+
 /// An arm and what of its URDF could not be taken over as it stands.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Imported {
@@ -389,11 +392,11 @@ impl<'a> Build<'a> {
     }
 
     fn origin(&self, joint: &urdf_rs::Joint) -> Result<Pose, UrdfError> {
-        if joint.origin.xyz.iter().chain(joint.origin.rpy.iter()).all(|value| value.is_finite()) {
+        if joint.origin.xyz.iter().chain(joint.origin.rpy.iter()).all(|value| value.abs() <= LARGEST) {
             return Ok(pose(&joint.origin));
         }
         let found = format!("origin xyz {:?} rpy {:?}", *joint.origin.xyz, *joint.origin.rpy);
-        Err(self.tree.source.joint_error(&joint.name, found, "finite numbers", "correct the <origin>"))
+        Err(self.tree.source.joint_error(&joint.name, found, "finite numbers of 1000 (m, rad) at most", "correct the <origin>"))
     }
 
     /// A joint of the chain and the unit vector along its axis in its own frame.
