@@ -1,0 +1,131 @@
+//! The whole chain, `kincal run`.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::harness::{Run, kincal, names, number, quick_run};
+
+fn check_errors(value: &Value, what: &str) {
+    let kinds: &[&str] = if value["rotation_rad"].is_null() { &["position_m"] } else { &["position_m", "rotation_rad"] };
+    for kind in kinds {
+        let [min, mean, rms, max] = ["min", "mean", "rms", "max"].map(|field| number(value, &format!("/{kind}/{field}")));
+        assert!(0.0 <= min && min <= mean && mean <= rms && rms <= max, "{what} {kind}: {value}");
+    }
+}
+
+/// What every identification of `arm8` must show.
+fn check_identification(identification: &Value) {
+    assert_eq!(identification["converged"], true);
+    assert_eq!(identification["rank"], 36);
+    let parameters = identification["parameters"].as_array().unwrap();
+    assert_eq!(parameters.len(), 45);
+    for parameter in parameters {
+        assert!(parameter["name"].is_string() && ["m", "rad"].contains(&parameter["unit"].as_str().unwrap()), "{parameter}");
+        assert!(parameter["nominal"].is_f64() && parameter["identified"].is_f64(), "{parameter}");
+        match parameter["standard_error"].as_f64() {
+            Some(error) => assert!(error > 0.0 && error < 1e-3 && parameter["dropped"] == false, "{parameter}"),
+            None => assert!(parameter["dropped"] == true && parameter["nominal"] == parameter["identified"], "{parameter}"),
+        }
+    }
+    assert_eq!(parameters.iter().filter(|parameter| parameter["standard_error"].is_f64()).count(), 36);
+    for what in ["nominal", "fitted", "held_out", "held_out_nominal"] {
+        check_errors(&identification[what], what);
+    }
+    for (kind, factor) in [("position_m", 10.0), ("rotation_rad", 10.0)] {
+        let [before, after] = ["held_out_nominal", "held_out"].map(|what| number(identification, &format!("/{what}/{kind}/mean")));
+        assert!(after * factor < before, "{kind}: {before} before, {after} after");
+    }
+}
+
+/// Each file that the result names, and no others.
+fn check_files(run: &Run, stem: &str) {
+    for (key, extension) in
+        [("recording", "mcap"), ("truth", "truth.toml"), ("urdf", "urdf"), ("calibrated_urdf", "calibrated.urdf")]
+    {
+        let path = Path::new(run.json[key].as_str().unwrap());
+        assert_eq!(path, run.path(&format!("{stem}.{extension}")));
+        assert!(path.metadata().unwrap().len() > 1000, "{}", path.display());
+    }
+    assert_eq!(names(run.folder.path()).len(), 4);
+}
+
+#[test]
+fn a_run_calibrates_and_says_so() {
+    let run = quick_run(&[]);
+    check_files(&run, "arm8");
+    assert_eq!((&run.json["scene"], &run.json["seed"]), (&"arm8".into(), &2019.into()));
+    let design = &run.json["design"];
+    assert_eq!(design["configurations"].as_array().unwrap().len(), 40);
+    assert!(number(design, "/indexes/comprehensive") > number(design, "/random/mean/comprehensive"));
+    let identification = &run.json["identification"];
+    check_identification(identification);
+    assert_eq!((&identification["nominal"]["count"], &identification["held_out"]["count"]), (&40.into(), &50.into()));
+    // The calibrated arm is not the nominal one.
+    let read = |key: &str| std::fs::read(run.json[key].as_str().unwrap()).unwrap();
+    assert_ne!(read("urdf"), read("calibrated_urdf"));
+}
+
+#[test]
+fn the_main_job_as_shipped_calibrates() {
+    let folder = tempfile::tempdir().unwrap();
+    let json = kincal(folder.path(), &["run", "scenes/arm8.toml", "--json"]).ends(0).json();
+    check_identification(&json["identification"]);
+    assert_eq!(json["design"]["stop"], "iteration_limit");
+    // Better than every random set it is compared with.
+    assert!(number(&json, "/design/indexes/comprehensive") > number(&json, "/design/random/max/comprehensive"));
+    let run = Run { folder, json };
+    check_files(&run, "arm8");
+}
+
+#[test]
+fn the_papers_scene_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let set = ["--set", "design.method=\"random\""];
+    let ran = kincal(folder.path(), &[&["run", "scenes/paper.toml", "--json", "-q"], &set[..]].concat()).ends(0);
+    assert_eq!(ran.stderr, "");
+    assert_eq!(ran.json()["identification"]["rank"], 36);
+    check_errors(&ran.json()["identification"]["held_out"], "held_out");
+}
+
+#[test]
+fn for_people_it_is_text_on_stdout_and_quiet_is_quiet() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = [&["run", "scenes/arm8.toml", "--quiet"], &crate::harness::QUICK[..]].concat();
+    let ran = kincal(folder.path(), &arguments).ends(0);
+    assert_eq!(ran.stderr, "");
+    for expected in ["Substitute for the lost Table 1", "held out (50), identified", "Identifiable: 36 of 45", "arm8.calibrated.urdf"] {
+        assert!(ran.stdout.contains(expected), "{expected}: {}", ran.stdout);
+    }
+    assert!(!ran.stdout.contains('\u{1b}'), "escape sequences in what is no terminal");
+}
+
+#[test]
+fn a_fit_that_says_nothing_ends_with_1() {
+    // True angles that have nothing to do with the nominal ones: whatever the fit ends with, it is no good answer.
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = [&["run", "scenes/arm8.toml", "--json", "--set", "injected.parameters.angle_deg=10000"], &crate::harness::QUICK[..]];
+    let json = kincal(folder.path(), &arguments.concat()).ends(1).json();
+    assert!(json["identification"]["converged"] == false || json["identification"]["rank"] == 0);
+}
+
+#[test]
+fn every_command_has_help_with_an_example() {
+    let folder = tempfile::tempdir().unwrap();
+    for command in ["run", "design", "measure", "identify", "replay", "export", "reproduce"] {
+        let ran = kincal(folder.path(), &[command, "--help"]).ends(0);
+        assert!(ran.stdout.contains("Example") && ran.stdout.contains(&format!("kincal {command} ")), "{}", ran.stdout);
+    }
+    assert!(kincal(folder.path(), &["--help"]).ends(0).stdout.contains("Exit codes: 0"));
+    assert!(kincal(folder.path(), &["--version"]).ends(0).stdout.starts_with("kincal "));
+}
+
+#[test]
+fn an_experiment_is_shown_beside_its_published_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    let json = kincal(folder.path(), &["reproduce", "count-error", "--trials", "2", "--json"]).ends(0).json();
+    let rows = json["rows"].as_array().unwrap();
+    assert_eq!(rows.iter().map(|row| row["count"].as_u64().unwrap()).collect::<Vec<_>>(), [8, 20, 60, 200]);
+    assert!(number(&rows[3], "/position_m/mean") < number(&rows[0], "/position_m/mean"));
+    assert_eq!(names(folder.path()), Vec::<String>::new());
+}

@@ -1,0 +1,171 @@
+//! `kincal replay`: identical, different, cut off, damaged, not a recording.
+
+use std::fs;
+
+use crate::harness::{Ran, Run, kincal, quick_run, rewrite_json};
+
+fn replay(run: &Run, recording: &str, more: &[&str]) -> Ran {
+    let path = run.text(recording);
+    kincal(&run.path("replayed"), &[&["replay", path.as_str()], more].concat())
+}
+
+#[test]
+fn a_recording_replays_bit_for_bit_with_and_without_its_truth() {
+    let run = quick_run(&[]);
+    let without = replay(&run, "arm8.mcap", &["--json"]).ends(0).json();
+    assert_eq!((&without["identical"], &without["complete"]), (&true.into(), &true.into()));
+    assert!(without["truth_identical"].is_null() && without["first_difference"].is_null());
+    assert_eq!(without["messages_compared"], crate::harness::messages(&run.path("arm8.mcap")).len());
+    let with = replay(&run, "arm8.mcap", &["--truth", &run.text("arm8.truth.toml"), "--json", "--threads", "1"]).ends(0).json();
+    assert_eq!((&with["identical"], &with["truth_identical"]), (&true.into(), &true.into()));
+    // Replaying leaves no files.
+    assert_eq!(crate::harness::names(&run.path("replayed")), Vec::<String>::new());
+}
+
+#[test]
+fn a_truth_file_of_another_run_is_refused() {
+    let (run, other) = (quick_run(&[]), quick_run(&["--seed", "7"]));
+    let ran = replay(&run, "arm8.mcap", &["--truth", &other.text("arm8-seed7.truth.toml")]).ends(2);
+    assert!(ran.stderr.contains("with seed 7, the recording to `arm8` with seed 2019"), "{}", ran.stderr);
+    for wrong in ["arm8.mcap", "arm8.urdf", "missing.toml"] {
+        let ran = replay(&run, "arm8.mcap", &["--truth", &run.text(wrong)]).ends(2);
+        assert!(ran.stderr.contains(wrong), "{}", ran.stderr);
+    }
+}
+
+#[test]
+fn an_edited_truth_file_differs() {
+    let run = quick_run(&[]);
+    let text = fs::read_to_string(run.path("arm8.truth.toml")).unwrap();
+    let check = |old: &str, new: &str, code: i32, expected: &str| {
+        assert!(text.contains(old), "{old}");
+        fs::write(run.path("edited.toml"), text.replacen(old, new, 1)).unwrap();
+        let ran = replay(&run, "arm8.mcap", &["--truth", &run.text("edited.toml")]).ends(code);
+        assert!(format!("{}{}", ran.stdout, ran.stderr).contains(expected), "{}{}", ran.stdout, ran.stderr);
+    };
+    check("length_mm = 1.0", "length_mm = 1.000001", 1, "different: /measurement[0].");
+    check("radial_um = 30.0", "radial_um = 31.0", 1, "different: /measurement[");
+    check("true_value = ", "true_value = 1", 1, "the truth file's parameters or poses differ");
+    check("length_mm = 1.0", "length_mm = -1.0", 2, "injected.parameters.length_mm");
+    check("length_mm = 1.0", "length_mm = \"1\"", 2, "injected.parameters.length_mm");
+    check("radial_um = 30.0", "radial_um = 1e5", 2, "radial clearance");
+    check("[injected]", "[injected_]", 2, "not a truth file");
+}
+
+#[test]
+fn a_changed_number_is_found_and_named() {
+    let run = quick_run(&[]);
+    let changed = run.path("changed.mcap");
+    let truth = run.text("arm8.truth.toml");
+    let check = |topic: &str, number, pointer: &'static str, more: &[&str], expected: &str| {
+        rewrite_json(&run.path("arm8.mcap"), &changed, topic, number, |value| {
+            let place = value.pointer_mut(pointer).unwrap();
+            *place = serde_json::to_value(place.as_f64().unwrap().next_up()).unwrap();
+        });
+        let ran = replay(&run, "changed.mcap", more).ends(1);
+        assert!(ran.stdout.starts_with(&format!("different: {expected}: recorded ")), "{expected}: {}", ran.stdout);
+        let json = replay(&run, "changed.mcap", &[more, &["--json"]].concat()).ends(1).json();
+        assert!(json["identical"] == false && json["first_difference"].as_str().unwrap().starts_with(expected), "{json}");
+    };
+    check("/measurement", 3, "/position_m/1", &["--truth", &truth], "/measurement[3].position_m[1]");
+    check("/measurement", 5, "/joints/7", &["--truth", &truth], "/measurement[5].joints[7]");
+    check("/design/swarm", 2, "/best/o1", &[], "/design/swarm[2].best.o1");
+    check("/design/outcome", 0, "/configurations/4/joints/2", &[], "/design/outcome[0].configurations[4].joints[2]");
+    check("/identification", 0, "/parameters/3/identified", &[], "/identification[0].parameters[3].identified");
+    // Without the truth a measurement is taken as recorded, but what was derived from it no longer fits.
+    rewrite_json(&run.path("arm8.mcap"), &changed, "/measurement", 3, |value| value["position_m"][1] = 0.123.into());
+    let ran = replay(&run, "changed.mcap", &[]).ends(1);
+    assert!(ran.stdout.starts_with("different: /measurement/pose_measured[3]."), "{}", ran.stdout);
+}
+
+#[test]
+fn a_changed_scene_is_found_or_refused() {
+    let run = quick_run(&[]);
+    let changed = run.path("changed.mcap");
+    let with_scene = |old: &str, new: &str| {
+        rewrite_json(&run.path("arm8.mcap"), &changed, "/run", 0, |value| {
+            let text = value["scene"].as_str().unwrap();
+            assert!(text.contains(old), "{old}: {text}");
+            value["scene"] = text.replacen(old, new, 1).into();
+        });
+        replay(&run, "changed.mcap", &[])
+    };
+    let ran = with_scene("seed = 2019", "seed = 2020").ends(1);
+    assert!(ran.stdout.starts_with("different: /design/swarm"), "{}", ran.stdout);
+    let ran = with_scene("random_sets = 30", "random_sets = 29").ends(1);
+    assert!(ran.stdout.starts_with("different: /design/outcome[0].random."), "{}", ran.stdout);
+    let ran = with_scene("random_sets = 30", "random_sets = -1").ends(2);
+    assert!(ran.stderr.contains("changed.mcap (scene)") && ran.stderr.contains("design.random_sets"), "{}", ran.stderr);
+    // A scene of another number of joints: everything after it fits no more.
+    with_scene("seed = 2019", "seed = 2019 # a comment").ends(0);
+    rewrite_json(&run.path("arm8.mcap"), &changed, "/run", 0, |value| value["version"] = "0.0.0".into());
+    let ran = replay(&run, "changed.mcap", &[]).ends(1);
+    assert!(ran.stdout.contains("/run[0].version: recorded \"0.0.0\""), "{}", ran.stdout);
+}
+
+#[test]
+fn a_damaged_recording_is_called_damaged() {
+    let run = quick_run(&[]);
+    let bytes = fs::read(run.path("arm8.mcap")).unwrap();
+    // Anywhere but in the magic at both ends, which is what tells a recording from other files.
+    for at in (1..10).map(|tenth| bytes.len() * tenth / 10).chain([bytes.len() - 9]) {
+        let mut altered = bytes.clone();
+        altered[at] ^= 0x10;
+        fs::write(run.path("damaged.mcap"), &altered).unwrap();
+        let ran = replay(&run, "damaged.mcap", &[]).ends(2);
+        assert!(ran.stderr.contains("is damaged at byte") && !ran.stderr.contains("cut off"), "{at}: {}", ran.stderr);
+        assert_eq!(ran.stderr.matches("damaged.mcap").count(), 1, "{}", ran.stderr);
+    }
+}
+
+#[test]
+fn a_cut_recording_is_compared_up_to_the_cut() {
+    let run = quick_run(&[]);
+    let bytes = fs::read(run.path("arm8.mcap")).unwrap();
+    let mut last = 0;
+    for share in [4, 3, 2] {
+        fs::write(run.path("cut.mcap"), &bytes[..bytes.len() / share]).unwrap();
+        for more in [vec![], vec!["--truth".to_owned(), run.text("arm8.truth.toml")]] {
+            let more: Vec<&str> = more.iter().map(String::as_str).collect();
+            let ran = replay(&run, "cut.mcap", &[&more[..], &["--json"]].concat()).ends(2);
+            assert!(ran.stderr.contains("cut.mcap is cut off") && !ran.stderr.contains("damaged"), "{}", ran.stderr);
+            let json = ran.json();
+            assert!(json["identical"] == false && json["complete"] == false && json["first_difference"].is_null(), "{json}");
+            let compared = json["messages_compared"].as_u64().unwrap();
+            assert!(compared >= last && compared > 0, "{json}");
+            last = compared;
+        }
+    }
+    // What is there can be used when that is asked for, and is not when it is not.
+    for command in [&["export", "--to", "csv"][..], &["identify"]] {
+        let path = run.text("cut.mcap");
+        let arguments = [&command[..1], &[&path], &command[1..]].concat();
+        let ran = kincal(&run.path("refused"), &arguments).ends(2);
+        assert!(ran.stderr.contains("cut off") && ran.stderr.contains("--partial"), "{}", ran.stderr);
+        assert_eq!(crate::harness::names(&run.path("refused")), Vec::<String>::new());
+        kincal(&run.path("used"), &[&arguments[..], &["--partial"]].concat()).ends(0);
+    }
+    assert_eq!(
+        crate::harness::names(&run.path("used")),
+        ["cut-identified.mcap", "cut-identified.urdf", "cut.csv"]
+    );
+}
+
+#[test]
+fn what_is_no_recording_is_named_for_what_it_is() {
+    let run = quick_run(&[]);
+    fs::write(run.path("empty.mcap"), "").unwrap();
+    fs::create_dir(run.path("folder.mcap")).unwrap();
+    fs::write(run.path("start.mcap"), &fs::read(run.path("arm8.mcap")).unwrap()[..20]).unwrap();
+    for (name, expected) in [
+        ("arm8.urdf", "is no MCAP file"),
+        ("empty.mcap", "is empty"),
+        ("folder.mcap", "Is a directory"),
+        ("missing.mcap", "No such file"),
+        ("start.mcap", "is cut off"),
+    ] {
+        let ran = replay(&run, name, &[]).ends(2);
+        assert!(ran.stderr.contains(expected) && ran.stdout.is_empty(), "{}", ran.stderr);
+        assert_eq!(ran.stderr.matches(name).count(), 1, "{}", ran.stderr);
+    }
+}

@@ -1,0 +1,93 @@
+//! The steps one by one, on the files that each leaves for the next.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::harness::{QUICK, kincal, number, quick_run};
+
+/// What `identify --json` prints, without the paths of what it wrote.
+fn identification(mut json: Value) -> Value {
+    let object = json.as_object_mut().unwrap();
+    object.remove("recording").unwrap();
+    object.remove("calibrated_urdf").unwrap();
+    json
+}
+
+#[test]
+fn design_measure_identify_is_what_run_does() {
+    let run = quick_run(&[]);
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    let path = |name: &str| out.join(name).to_str().unwrap().to_owned();
+    let design = kincal(out, &[&["design", "scenes/arm8.toml", "--json"], &QUICK[..]].concat()).ends(0).json();
+    assert_eq!(design["design"], run.json["design"]);
+    let designed = path("arm8-design.mcap");
+    let measure = [&["measure", "scenes/arm8.toml", "--design", &designed, "--json"], &QUICK[..]].concat();
+    let measured = kincal(out, &measure).ends(0).json();
+    assert_eq!((&measured["poses"], &measured["settled"]), (&90.into(), &90.into()));
+    let json = kincal(out, &["identify", &path("arm8-measure.mcap"), "--json"]).ends(0).json();
+    assert!(json["parameters"].as_array().unwrap().iter().filter_map(|p| p["standard_error"].as_f64()).all(f64::is_finite));
+    assert_eq!(identification(json), run.json["identification"]);
+    let [steps, whole] = [out.join("arm8-measure.truth.toml"), run.path("arm8.truth.toml")].map(|path| fs::read(path).unwrap());
+    assert!(steps == whole, "the truth differs");
+    // What each step recorded replays.
+    let truth = path("arm8-measure.truth.toml");
+    for name in ["arm8-design.mcap", "arm8-measure.mcap", "arm8-measure-identified.mcap"] {
+        kincal(out, &["replay", &path(name)]).ends(0);
+        kincal(out, &["replay", &path(name), "--truth", &truth]).ends(0);
+    }
+}
+
+#[test]
+fn identifying_a_runs_recording_again_gives_the_same_numbers() {
+    let run = quick_run(&[]);
+    let json = kincal(run.folder.path(), &["identify", &run.text("arm8.mcap"), "--json"]).ends(0).json();
+    assert_eq!(identification(json), run.json["identification"]);
+    let urdf = |name: &str| fs::read(run.path(name)).unwrap();
+    assert_eq!(urdf("arm8-identified.urdf"), urdf("arm8.calibrated.urdf"));
+}
+
+#[test]
+fn another_recording_carries_the_held_out_error() {
+    let run = quick_run(&[]);
+    let other = quick_run(&["--set", "plan.held_out_count=60"]);
+    let arguments = ["identify", &run.text("arm8.mcap"), "--evaluate", &other.text("arm8.mcap"), "--json"];
+    let json = kincal(run.folder.path(), &arguments).ends(0).json();
+    // All of the other's rows, whatever they were for there; the fit is the same.
+    assert_eq!(json["held_out"]["count"], 100);
+    assert_eq!(json["parameters"], run.json["identification"]["parameters"]);
+    assert!(number(&json, "/held_out/position_m/mean") * 10.0 < number(&json, "/held_out_nominal/position_m/mean"));
+}
+
+#[test]
+fn a_table_of_the_same_measurements_gives_about_the_same_error() {
+    let run = quick_run(&[]);
+    let out = run.folder.path();
+    kincal(out, &["export", &run.text("arm8.mcap"), "--to", "csv"]).ends(0);
+    let arguments = ["identify", &run.text("arm8.csv"), "--robot", &run.text("arm8.urdf"), "--json"];
+    let json = kincal(out, &arguments).ends(0).json();
+    let of_recording = &run.json["identification"];
+    assert_eq!(json["held_out"]["count"], 50);
+    for pointer in ["/held_out/position_m/mean", "/held_out/rotation_rad/mean"] {
+        let ratio = number(&json, pointer) / number(of_recording, pointer);
+        println!("{pointer}: {ratio:.4} times the recording's");
+        assert!((0.8..1.25).contains(&ratio), "{pointer}: {ratio}");
+    }
+    // The scene as robot is the same robot.
+    let of_scene = kincal(out, &["identify", &run.text("arm8.csv"), "--robot", "scenes/arm8.toml", "--json"]).ends(0).json();
+    let ratio = number(&of_scene, "/held_out/position_m/mean") / number(&json, "/held_out/position_m/mean");
+    assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+}
+
+#[test]
+fn the_exported_scene_repeats_the_design() {
+    let run = quick_run(&[]);
+    let out = run.folder.path();
+    kincal(out, &["export", &run.text("arm8.mcap"), "--to", "toml"]).ends(0);
+    let public = run.text("arm8.public.toml");
+    let design = kincal(out, &["design", &public, "--json"]).ends(0).json();
+    assert_eq!(design["design"], run.json["design"]);
+    let refused = kincal(out, &["run", &public]).ends(2);
+    assert!(refused.stderr.contains("no [injected] section") && refused.stderr.contains("arm8.public.toml"), "{}", refused.stderr);
+}
