@@ -225,7 +225,7 @@ fn prepare(shape: &Shape) -> Prepared {
             let z_from_y = nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
             let body_from_shape = Pose::from_parts(pose.translation, pose.rotation * z_from_y);
             let shape: Box<dyn ParryShape> = Box::new(Cylinder::new(half_length, radius));
-            Prepared { centre, radius: half_length.hypot(radius), kind: Kind::Other { body_from_shape, shape } }
+            Prepared { centre, radius: libm::hypot(half_length, radius), kind: Kind::Other { body_from_shape, shape } }
         }
         Geometry::Box { half_extents: [x, y, z] } => {
             let shape: Box<dyn ParryShape> = Box::new(Cuboid::new(ParryVector::new(x, y, z)));
