@@ -28,6 +28,7 @@ pub(crate) struct Arguments {
 
 /// Options of every command.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Options of every command")]
 pub(crate) struct Global {
     /// Print one JSON object on stdout; everything else goes to stderr
     #[arg(long, global = true)]
