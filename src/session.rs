@@ -79,12 +79,7 @@ pub fn start(command: &str, scene_toml: &str, listener: &mut dyn Listener) -> Re
 /// What a recording of this version begins with.
 #[must_use]
 pub fn start_event(command: &str, scene_toml: &str, real: Option<RealCell>) -> Start {
-    Start {
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        command: command.to_owned(),
-        scene: scene_toml.to_owned(),
-        real,
-    }
+    Start { version: env!("CARGO_PKG_VERSION").to_owned(), command: command.to_owned(), scene: scene_toml.to_owned(), real }
 }
 
 /// A real arm in the frame in which it was measured, and its sensor.
@@ -116,11 +111,7 @@ pub fn real_robot(start: &Start, real: &RealCell) -> Result<(Arm, Vec<String>), 
 ///
 /// # Errors
 /// If the measurements do not tell where it stands.
-pub fn real_arm(
-    real: &RealCell,
-    robot: (Arm, Vec<String>),
-    measurements: &[Measurement],
-) -> Result<RealArm, SessionError> {
+pub fn real_arm(real: &RealCell, robot: (Arm, Vec<String>), measurements: &[Measurement]) -> Result<RealArm, SessionError> {
     let attitude = measurements.iter().all(|measurement| measurement.attitude_xyzw.is_some());
     let sensor = Sensor {
         position_in_base: nalgebra::Point3::origin(),

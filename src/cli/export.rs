@@ -16,7 +16,8 @@ use crate::{recording, scene};
 pub(crate) fn command(global: &Global, options: &ExportOptions) -> anyhow::Result<Outcome> {
     let path = &options.input;
     let (extension, text) = if is_recording(path) { from_recording(global, options)? } else { from_scene(options)? };
-    std::fs::create_dir_all(&global.out).with_context(|| format!("creating {}; choose another folder with --out", global.out.display()))?;
+    std::fs::create_dir_all(&global.out)
+        .with_context(|| format!("creating {}; choose another folder with --out", global.out.display()))?;
     let written = global.out.join(format!("{}.{extension}", input_stem(path, "")));
     if written.exists() && std::fs::canonicalize(&written)? == std::fs::canonicalize(path)? {
         bail!("{} would overwrite its own input; choose another folder with --out", written.display());

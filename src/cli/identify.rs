@@ -45,7 +45,9 @@ fn from_table(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outc
     let Some(robot) = &options.robot else {
         bail!("{} is a table: give its nominal robot with --robot FILE (a URDF or a scene)", options.input.display());
     };
-    for (name, value) in [("--position-noise-um", options.position_noise_um), ("--attitude-noise-deg", options.attitude_noise_deg)] {
+    for (name, value) in
+        [("--position-noise-um", options.position_noise_um), ("--attitude-noise-deg", options.attitude_noise_deg)]
+    {
         ensure!(value.is_finite() && value > 0.0, "{name} {value}: a positive number is needed");
     }
     let (start, real) = described(robot, options)?;
@@ -140,7 +142,11 @@ pub(crate) fn recorded(global: &Global, path: &Path, partial: bool) -> anyhow::R
             _ => None,
         })
         .collect();
-    ensure!(!measurements.is_empty(), "{} holds no measurements; make some with `kincal measure` or `kincal run`", path.display());
+    ensure!(
+        !measurements.is_empty(),
+        "{} holds no measurements; make some with `kincal measure` or `kincal run`",
+        path.display()
+    );
     Ok((file, measurements))
 }
 

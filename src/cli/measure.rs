@@ -47,6 +47,9 @@ pub(crate) fn command(global: &Global, options: &MeasureOptions) -> anyhow::Resu
     if let Some(recording) = &recording {
         output::show(global, &format!("Recording   {}\nTruth       {}", recording.display(), truth_path.display()))?;
     }
-    output::show_json(global, &json!({ "poses": measurements.len(), "settled": settling.settled, "recording": recording, "truth": truth_path }))?;
+    output::show_json(
+        global,
+        &json!({ "poses": measurements.len(), "settled": settling.settled, "recording": recording, "truth": truth_path }),
+    )?;
     Ok(if settling.settled == measurements.len() { Outcome::Good } else { Outcome::Bad })
 }

@@ -93,7 +93,10 @@ pub(crate) fn command(global: &Global, options: &ReplayOptions) -> anyhow::Resul
     )?;
     if let Some(cut) = &recorded.cut {
         eprintln!("kincal: {}: {cut}", path.display());
-        anyhow::bail!("{} is cut off: what is there was compared, the rest is lost; run the scene again for a whole recording", path.display());
+        anyhow::bail!(
+            "{} is cut off: what is there was compared, the rest is lost; run the scene again for a whole recording",
+            path.display()
+        );
     }
     Ok(if identical { Outcome::Good } else { Outcome::Bad })
 }

@@ -101,11 +101,9 @@ fn one(scene: &Scene, injected: &Injected, count: usize, trial: usize) -> Result
     let (measurements, _) = measure(&scene, injected, &planned, &mut Nobody)?;
     let result = identify(&scene.arm, &scene.sensor, scene.weights, &measurements)?;
     Ok(match (result.converged, result.held_out, result.held_out_nominal) {
-        (true, Some(after), Some(before)) => Some([
-            after.position_m.mean,
-            after.rotation_rad.map_or(0.0, |rotation| rotation.mean),
-            before.position_m.mean,
-        ]),
+        (true, Some(after), Some(before)) => {
+            Some([after.position_m.mean, after.rotation_rad.map_or(0.0, |rotation| rotation.mean), before.position_m.mean])
+        }
         _ => None,
     })
 }

@@ -10,7 +10,9 @@ use crate::measurement::{Measurement, Sensor};
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum AlignmentError {
     /// Too few rows.
-    #[error("{found} measurements cannot tell where the arm stands in the measurement frame; at least 4 different ones are needed")]
+    #[error(
+        "{found} measurements cannot tell where the arm stands in the measurement frame; at least 4 different ones are needed"
+    )]
     TooFew {
         /// Rows.
         found: usize,
@@ -70,7 +72,8 @@ pub fn align(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement]) -> Resul
 fn registration(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<(UnitQuaternion<f64>, Vector3<f64>)> {
     let count = from.len() as f64;
     let (from_centre, to_centre) = (from.iter().sum::<Vector3<f64>>() / count, to.iter().sum::<Vector3<f64>>() / count);
-    let covariance: Matrix3<f64> = from.iter().zip(to).map(|(from, to)| (to - to_centre) * (from - from_centre).transpose()).sum();
+    let covariance: Matrix3<f64> =
+        from.iter().zip(to).map(|(from, to)| (to - to_centre) * (from - from_centre).transpose()).sum();
     let svd = covariance.svd(true, true);
     let (u, v_t) = (svd.u?, svd.v_t?);
     let mut values: Vec<f64> = svd.singular_values.iter().copied().collect();

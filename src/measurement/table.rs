@@ -77,10 +77,8 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
         csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).flexible(true).from_reader(text.as_bytes());
     let header = reader.headers().map_err(|error| wrong(1, error.to_string()))?.clone();
     let header_line = header.position().map_or(1, csv::Position::line);
-    let columns = header
-        .iter()
-        .map(|name| column(name).map_err(|message| wrong(header_line, message)))
-        .collect::<Result<Vec<_>, _>>()?;
+    let columns =
+        header.iter().map(|name| column(name).map_err(|message| wrong(header_line, message))).collect::<Result<Vec<_>, _>>()?;
     let layout = Layout::new(&columns, &header).map_err(|message| wrong(header_line, message))?;
 
     let mut measurements: Vec<Measurement> = Vec::new();
@@ -196,7 +194,9 @@ impl Layout {
             Column::Joint { joint, .. } => Some(*joint),
             _ => None,
         })
-        .map_err(|missing| format!("joint columns must be q1, q2, … without a gap, each once: q{} is missing or doubled", missing + 1))?;
+        .map_err(|missing| {
+            format!("joint columns must be q1, q2, … without a gap, each once: q{} is missing or doubled", missing + 1)
+        })?;
         if joints == 0 {
             return Err("no joint columns; q1_rad, q2_rad, … (or _deg, _m, _mm) are needed".to_owned());
         }
@@ -220,7 +220,9 @@ impl Layout {
             Column::Temperature { sensor } => Some(*sensor),
             _ => None,
         })
-        .map_err(|missing| format!("temperature columns must be temp1_c, temp2_c, … without a gap: temp{}_c is missing", missing + 1))?;
+        .map_err(|missing| {
+            format!("temperature columns must be temp1_c, temp2_c, … without a gap: temp{}_c is missing", missing + 1)
+        })?;
         Ok(Layout { joints, sensors, attitude })
     }
 }

@@ -125,11 +125,9 @@ impl Topic {
             Topic::Identification => "kincal.Identification",
             Topic::Shapes => "foxglove.SceneUpdate",
             Topic::Transforms => "foxglove.FrameTransforms",
-            Topic::ArmPoints
-            | Topic::SwarmEndPoints
-            | Topic::BestEndPoints
-            | Topic::ResidualsBefore
-            | Topic::ResidualsAfter => "foxglove.PointCloud",
+            Topic::ArmPoints | Topic::SwarmEndPoints | Topic::BestEndPoints | Topic::ResidualsBefore | Topic::ResidualsAfter => {
+                "foxglove.PointCloud"
+            }
             Topic::Chosen | Topic::PosesPredicted => "foxglove.PosesInFrame",
             Topic::PoseMeasured | Topic::PoseNominal => "foxglove.PoseInFrame",
             Topic::Log => "foxglove.Log",

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::cell::truth::{TrueParameter, TruePose};
 use crate::cell::Truth;
+use crate::cell::truth::{TrueParameter, TruePose};
 
 /// The file as it stands: TOML, the scene's `[injected]` section first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -127,17 +127,7 @@ pub fn identification(identification: &Identification) -> String {
     };
     add("fitted", Some(&identification.nominal), Some(&identification.fitted));
     add("held out", identification.held_out_nominal.as_ref(), identification.held_out.as_ref());
-    let header = [
-        "configurations, model",
-        "position mean (mm)",
-        "RMS",
-        "min",
-        "max",
-        "attitude mean (°)",
-        "RMS",
-        "min",
-        "max",
-    ];
+    let header = ["configurations, model", "position mean (mm)", "RMS", "min", "max", "attitude mean (°)", "RMS", "min", "max"];
     let mut text = table(&header, rows);
     let dropped = identification.parameters.iter().filter(|parameter| parameter.dropped).count();
     text.push_str(&format!(
@@ -217,7 +207,8 @@ pub fn count_error(rows: &[crate::experiments::count_error::Row]) -> String {
     let cells = rows
         .iter()
         .map(|row| {
-            let mut cells = vec![row.count.to_string(), number(row.nominal_position_m.mean * 1e3), number(row.paper_position_m * 1e3)];
+            let mut cells =
+                vec![row.count.to_string(), number(row.nominal_position_m.mean * 1e3), number(row.paper_position_m * 1e3)];
             cells.extend(interval(&row.position_m, 1e3));
             cells.push(number(row.paper_attitude_rad * degrees));
             cells.extend(interval(&row.attitude_rad, degrees));
