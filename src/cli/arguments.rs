@@ -56,7 +56,7 @@ pub(crate) enum Command {
     #[command(after_help = "Example:\n  kincal run scenes/arm8.toml --set design.count=20 --seed 7 --rerun run.rrd")]
     Run(SceneOptions),
     /// Choose the configurations to measure
-    #[command(after_help = "Example:\n  kincal design scenes/arm8.toml --set design.method=\\\"random\\\"")]
+    #[command(after_help = "Example:\n  kincal design scenes/arm8.toml --set design.method=random")]
     Design(SceneOptions),
     /// Measure configurations on the simulated arm
     #[command(after_help = "Example:\n  kincal measure scenes/arm8.toml --design recordings/arm8-design.mcap")]
