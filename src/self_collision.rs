@@ -25,6 +25,8 @@ struct Body {
     /// Number of the chain's frame that carries the body; `None` for a fixture.
     frame: Option<usize>,
     shapes: Vec<Prepared>,
+    /// Where its shapes stand among the placed shapes of all bodies.
+    first: usize,
 }
 
 struct Prepared {
@@ -36,15 +38,9 @@ struct Prepared {
 
 enum Kind {
     /// A swept ball: the ends of its segment in the body's frame. Balls have both ends in one point.
-    Round {
-        a: Vector3<f64>,
-        b: Vector3<f64>,
-        radius: f64,
-    },
-    Other {
-        body_from_shape: Pose,
-        shape: Box<dyn ParryShape>,
-    },
+    Round { a: Vector3<f64>, b: Vector3<f64>, radius: f64 },
+    /// Anything else, with its axes in the body's frame.
+    Other { body_from_shape: Pose, axes: [Vector3<f64>; 3], shape: Box<dyn ParryShape> },
 }
 
 /// Two bodies that touch.
@@ -59,7 +55,17 @@ pub struct Contact {
 /// Memory for the checks of one thread.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
-    frames: Vec<([Vector3<f64>; 3], Vector3<f64>)>,
+    frames: Vec<Frame>,
+    placed: Vec<Placed>,
+}
+
+/// A shape in base.
+#[derive(Clone, Copy, Debug)]
+struct Placed {
+    centre: Vector3<f64>,
+    /// Ends of a swept ball's segment; the centre twice for other shapes.
+    a: Vector3<f64>,
+    b: Vector3<f64>,
 }
 
 impl CollisionCheck {
@@ -74,7 +80,7 @@ impl CollisionCheck {
                 continue;
             }
             let frame = names.iter().position(|name| *name == link.name);
-            bodies.push(Body { name: link.name.clone(), frame, shapes: link.shapes.iter().map(prepare).collect() });
+            bodies.push(Body::new(link.name.clone(), frame, &link.shapes, &bodies));
             link_of_body.push(index);
         }
         let mut pairs = Vec::new();
@@ -91,7 +97,7 @@ impl CollisionCheck {
         for fixture in &arm.fixtures {
             let body = bodies.len();
             let frame = names.iter().position(|name| *name == "base_link").filter(|_| names.first() == Some(&"world"));
-            bodies.push(Body { name: fixture.name.clone(), frame, shapes: vec![prepare(&fixture.shape)] });
+            bodies.push(Body::new(fixture.name.clone(), frame, std::slice::from_ref(&fixture.shape), &bodies));
             for (first, link) in link_of_body.iter().enumerate() {
                 if !fixture.may_touch.contains(link) {
                     pairs.push((first, body));
@@ -115,10 +121,33 @@ impl CollisionCheck {
     }
 
     fn first_pair(&self, joints: &[f64], scratch: &mut Scratch) -> Option<(usize, usize)> {
-        let frames = &mut scratch.frames;
+        let Scratch { frames, placed } = scratch;
         frames.clear();
         self.chain.visit_frames(joints, |_, axes, origin| frames.push((*axes, *origin)));
-        self.pairs.iter().copied().find(|(first, second)| touch(&self.bodies[*first], &self.bodies[*second], frames))
+        place(&self.bodies, frames, placed);
+        self.pairs.iter().copied().find(|(first, second)| touch(&self.bodies[*first], &self.bodies[*second], frames, placed))
+    }
+}
+
+impl Body {
+    fn new(name: String, frame: Option<usize>, shapes: &[Shape], before: &[Body]) -> Self {
+        let first = before.last().map_or(0, |body| body.first + body.shapes.len());
+        Body { name, frame, shapes: shapes.iter().map(prepare).collect(), first }
+    }
+}
+
+/// Every shape of `bodies` in base, once for all its pairs.
+fn place(bodies: &[Body], frames: &[Frame], placed: &mut Vec<Placed>) {
+    placed.clear();
+    for body in bodies {
+        let frame = frame_of(body, frames);
+        placed.extend(body.shapes.iter().map(|shape| {
+            let centre = to_base(&frame, &shape.centre);
+            match &shape.kind {
+                Kind::Round { a, b, .. } => Placed { centre, a: to_base(&frame, a), b: to_base(&frame, b) },
+                Kind::Other { .. } => Placed { centre, a: centre, b: centre },
+            }
+        }));
     }
 }
 
@@ -132,36 +161,40 @@ fn to_base((axes, origin): &Frame, point: &Vector3<f64>) -> Vector3<f64> {
     origin + axes[0] * point.x + axes[1] * point.y + axes[2] * point.z
 }
 
-fn touch(first: &Body, second: &Body, frames: &[Frame]) -> bool {
-    let (first_frame, second_frame) = (frame_of(first, frames), frame_of(second, frames));
-    first.shapes.iter().any(|one| {
-        let one_centre = to_base(&first_frame, &one.centre);
-        second.shapes.iter().any(|other| {
+fn touch(first: &Body, second: &Body, frames: &[Frame], placed: &[Placed]) -> bool {
+    first.shapes.iter().zip(&placed[first.first..]).any(|(one, one_at)| {
+        second.shapes.iter().zip(&placed[second.first..]).any(|(other, other_at)| {
             let reach = one.radius + other.radius;
-            (to_base(&second_frame, &other.centre) - one_centre).norm_squared() <= reach * reach
-                && shapes_touch(one, &first_frame, other, &second_frame)
+            (other_at.centre - one_at.centre).norm_squared() <= reach * reach
+                && shapes_touch((one, one_at, first), (other, other_at, second), frames)
         })
     })
 }
 
-fn shapes_touch(one: &Prepared, one_frame: &Frame, other: &Prepared, other_frame: &Frame) -> bool {
-    if let (Kind::Round { a, b, radius }, Kind::Round { a: c, b: d, radius: other_radius }) = (&one.kind, &other.kind) {
-        let (a, b) = (vector(&to_base(one_frame, a)), vector(&to_base(one_frame, b)));
-        let (c, d) = (vector(&to_base(other_frame, c)), vector(&to_base(other_frame, d)));
+fn shapes_touch(
+    (one, one_at, first): (&Prepared, &Placed, &Body),
+    (other, other_at, second): (&Prepared, &Placed, &Body),
+    frames: &[Frame],
+) -> bool {
+    if let (Kind::Round { radius, .. }, Kind::Round { radius: other_radius, .. }) = (&one.kind, &other.kind) {
+        let (a, b) = (vector(&one_at.a), vector(&one_at.b));
+        let (c, d) = (vector(&other_at.a), vector(&other_at.b));
         let (on_one, on_other) = closest_on_segments((&a, &b), (&c, &d));
         let reach = radius + other_radius;
         return (at(&on_one, a, b) - at(&on_other, c, d)).length_squared() <= reach * reach;
     }
-    if apart_of_box(one, one_frame, other, other_frame) || apart_of_box(other, other_frame, one, one_frame) {
+    if apart_of_box(one, one_at, (other, other_at, second), frames) || apart_of_box(other, other_at, (one, one_at, first), frames)
+    {
         return false;
     }
+    let (one_frame, other_frame) = (&frame_of(first, frames), &frame_of(second, frames));
     let round;
     let (one_pose, one_shape) = match &one.kind {
         Kind::Round { a, b, radius } => {
             round = Capsule::new(vector(a), vector(b), *radius);
             (parry_pose(one_frame, &Pose::identity()), &round as &dyn ParryShape)
         }
-        Kind::Other { body_from_shape, shape } => (parry_pose(one_frame, body_from_shape), &**shape),
+        Kind::Other { body_from_shape, shape, .. } => (parry_pose(one_frame, body_from_shape), &**shape),
     };
     let other_round;
     let (other_pose, other_shape) = match &other.kind {
@@ -169,28 +202,38 @@ fn shapes_touch(one: &Prepared, one_frame: &Frame, other: &Prepared, other_frame
             other_round = Capsule::new(vector(a), vector(b), *radius);
             (parry_pose(other_frame, &Pose::identity()), &other_round as &dyn ParryShape)
         }
-        Kind::Other { body_from_shape, shape } => (parry_pose(other_frame, body_from_shape), &**shape),
+        Kind::Other { body_from_shape, shape, .. } => (parry_pose(other_frame, body_from_shape), &**shape),
     };
     // Every pair of these convex shapes is supported; where parry could not tell, the pair counts as touching.
     intersection_test(&one_pose, one_shape, &other_pose, other_shape).map_or(true, |answer| answer.intersecting)
 }
 
 /// Whether a swept ball lies beyond one face of a box: a cheap test that spares most of the calls for a floor.
-fn apart_of_box(round: &Prepared, round_frame: &Frame, cuboid: &Prepared, cuboid_frame: &Frame) -> bool {
-    let (Kind::Round { a, b, radius }, Kind::Other { body_from_shape, shape }) = (&round.kind, &cuboid.kind) else {
+fn apart_of_box(
+    round: &Prepared,
+    round_at: &Placed,
+    (cuboid, cuboid_at, cuboid_body): (&Prepared, &Placed, &Body),
+    frames: &[Frame],
+) -> bool {
+    let (Kind::Round { radius, .. }, Kind::Other { axes, shape, .. }) = (&round.kind, &cuboid.kind) else {
         return false;
     };
-    let Some(cuboid) = shape.as_cuboid() else {
+    let Some(half) = shape.as_cuboid().map(|cuboid| cuboid.half_extents) else {
         return false;
     };
-    let in_box = |point: &Vector3<f64>| {
-        let from_origin = to_base(round_frame, point) - cuboid_frame.1;
-        let in_body = Vector3::from(cuboid_frame.0.map(|axis| axis.dot(&from_origin)));
-        body_from_shape.inverse_transform_point(&in_body.into()).coords
-    };
-    let (a, b) = (in_box(a), in_box(b));
-    let half = [cuboid.half_extents.x, cuboid.half_extents.y, cuboid.half_extents.z];
-    (0..3).any(|axis| a[axis].min(b[axis]) - radius > half[axis] || a[axis].max(b[axis]) + radius < -half[axis])
+    let (a, b) = (round_at.a - cuboid_at.centre, round_at.b - cuboid_at.centre);
+    [half.x, half.y, half.z].into_iter().zip(axes).any(|(half, axis)| {
+        let axis = match cuboid_body.frame {
+            None => *axis,
+            Some(_) => turn(&frame_of(cuboid_body, frames), axis),
+        };
+        let (along_a, along_b) = (axis.dot(&a), axis.dot(&b));
+        along_a.min(along_b) - radius > half || along_a.max(along_b) + radius < -half
+    })
+}
+
+fn turn((frame, _): &Frame, direction: &Vector3<f64>) -> Vector3<f64> {
+    frame[0] * direction.x + frame[1] * direction.y + frame[2] * direction.z
 }
 
 fn at(location: &SegmentPointLocation, a: ParryVector, b: ParryVector) -> ParryVector {
@@ -209,6 +252,11 @@ fn parry_pose(frame: &Frame, body_from_shape: &Pose) -> ParryPose {
     ParryPose::from_parts(vector(&pose.translation.vector), ParryRotation::from_xyzw(q.i, q.j, q.k, q.w))
 }
 
+fn other(body_from_shape: Pose, shape: Box<dyn ParryShape>) -> Kind {
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| body_from_shape.rotation * axis);
+    Kind::Other { body_from_shape, axes, shape }
+}
+
 fn prepare(shape: &Shape) -> Prepared {
     let pose = shape.link_from_shape;
     let centre = pose.translation.vector;
@@ -225,11 +273,11 @@ fn prepare(shape: &Shape) -> Prepared {
             let z_from_y = nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
             let body_from_shape = Pose::from_parts(pose.translation, pose.rotation * z_from_y);
             let shape: Box<dyn ParryShape> = Box::new(Cylinder::new(half_length, radius));
-            Prepared { centre, radius: half_length.hypot(radius), kind: Kind::Other { body_from_shape, shape } }
+            Prepared { centre, radius: libm::hypot(half_length, radius), kind: other(body_from_shape, shape) }
         }
         Geometry::Box { half_extents: [x, y, z] } => {
             let shape: Box<dyn ParryShape> = Box::new(Cuboid::new(ParryVector::new(x, y, z)));
-            Prepared { centre, radius: Vector3::new(x, y, z).norm(), kind: Kind::Other { body_from_shape: pose, shape } }
+            Prepared { centre, radius: Vector3::new(x, y, z).norm(), kind: other(pose, shape) }
         }
     }
 }
@@ -307,7 +355,9 @@ mod tests {
         let direction = Vector3::from_fn(|_, _| stream.normal()).normalize();
         let local = match shape.geometry {
             Geometry::Sphere { radius } => direction * radius,
-            Geometry::Capsule { half_length, radius } => direction * radius + Vector3::z() * half_length * stream.uniform(-1.0, 1.0),
+            Geometry::Capsule { half_length, radius } => {
+                direction * radius + Vector3::z() * half_length * stream.uniform(-1.0, 1.0)
+            }
             Geometry::Cylinder { half_length, radius } => {
                 let across = Vector3::new(direction.x, direction.y, 0.0).normalize() * radius * stream.unit().sqrt();
                 across + Vector3::z() * half_length * stream.uniform(-1.0, 1.0)
@@ -337,15 +387,18 @@ mod tests {
         let identity = ([Vector3::x(), Vector3::y(), Vector3::z()], Vector3::zeros());
         let (mut shared, mut missed) = (0, 0);
         for _ in 0..600 {
-            let mut place = || {
+            let mut random = || {
                 let turn = Vector3::from_fn(|_, _| stream.uniform(-2.0, 2.0));
                 let at = Vector3::from_fn(|_, _| stream.uniform(-0.15, 0.15));
                 let geometry = geometry(&mut stream);
                 Shape { link_from_shape: Pose::from_parts(Translation3::from(at), rotation_from_vector(&turn)), geometry }
             };
-            let (one, other) = (place(), place());
-            let body = |shape: &Shape| Body { name: String::new(), frame: None, shapes: vec![prepare(shape)] };
-            let answer = touch(&body(&one), &body(&other), &[identity]);
+            let (one, other) = (random(), random());
+            let first = Body::new(String::new(), Some(0), std::slice::from_ref(&one), &[]);
+            let second = Body::new(String::new(), Some(0), std::slice::from_ref(&other), std::slice::from_ref(&first));
+            let (bodies, mut placed) = ([first, second], Vec::new());
+            place(&bodies, &[identity], &mut placed);
+            let answer = touch(&bodies[0], &bodies[1], &[identity], &placed);
             let found = (0..2000).any(|_| contains(&other, &sample_surface(&mut stream, &one, 1.0)));
             assert!(answer || !found, "{one:?} and {other:?} share a point but are said to be apart");
             shared += usize::from(found);

@@ -1,15 +1,18 @@
 //! The steps of a calibration chained: what the commands do, and what a replay does again.
 
+use crate::arm::Arm;
 use crate::cell::measure::{MeasureError, plan};
 use crate::cell::{Truth, measure};
 use crate::design::candidates::AlwaysColliding;
 use crate::design::outcome::DesignOutcome;
 use crate::design::{self, DesignError};
+use crate::identification::alignment::{AlignmentError, align};
 use crate::identification::outcome::Identification;
 use crate::identification::{IdentificationError, identify};
-use crate::measurement::Measurement;
-use crate::recording::event::{Event, Listener, ListenerError, Start};
-use crate::scene::{Injected, Scene};
+use crate::kinematics::urdf::{self, UrdfError};
+use crate::measurement::{Measurement, Role, Sensor};
+use crate::recording::event::{Event, Listener, ListenerError, RealCell, Start};
+use crate::scene::{self, Injected, Scene, SceneError, Weights};
 
 /// A step failed.
 #[derive(Debug, thiserror::Error)]
@@ -26,6 +29,15 @@ pub enum SessionError {
     /// Identifying.
     #[error(transparent)]
     Identification(#[from] IdentificationError),
+    /// Placing a real arm.
+    #[error(transparent)]
+    Alignment(#[from] AlignmentError),
+    /// Reading a robot.
+    #[error(transparent)]
+    Urdf(#[from] UrdfError),
+    /// Reading a scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
     /// Recording or showing.
     #[error(transparent)]
     Listener(#[from] ListenerError),
@@ -61,11 +73,73 @@ pub fn run(scene: &Scene, scene_toml: &str, injected: &Injected, listener: &mut 
 /// # Errors
 /// If the listener fails.
 pub fn start(command: &str, scene_toml: &str, listener: &mut dyn Listener) -> Result<(), ListenerError> {
-    listener.take(&Event::Start(Start {
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        command: command.to_owned(),
-        scene: scene_toml.to_owned(),
-    }))
+    listener.take(&Event::Start(start_event(command, scene_toml, None)))
+}
+
+/// What a recording of this version begins with.
+#[must_use]
+pub fn start_event(command: &str, scene_toml: &str, real: Option<RealCell>) -> Start {
+    Start { version: env!("CARGO_PKG_VERSION").to_owned(), command: command.to_owned(), scene: scene_toml.to_owned(), real }
+}
+
+/// A real arm in the frame in which it was measured, and its sensor.
+#[derive(Clone, Debug)]
+pub struct RealArm {
+    /// The nominal arm, its base in the measurement frame and the target on its tool fitted.
+    pub arm: Arm,
+    /// Declared accuracy.
+    pub sensor: Sensor,
+    /// What was left out of the robot's file.
+    pub notes: Vec<String>,
+}
+
+/// The nominal robot of a real cell, as its recording's first event describes it.
+///
+/// # Errors
+/// If its URDF or scene cannot be used.
+pub fn real_robot(start: &Start, real: &RealCell) -> Result<(Arm, Vec<String>), SessionError> {
+    match &real.urdf {
+        Some(text) => {
+            let imported = urdf::import(text, "robot", real.base_link.as_deref(), real.tip_link.as_deref())?;
+            Ok((imported.arm, imported.notes))
+        }
+        None => Ok((scene::parse(&start.scene, "robot")?.scene.arm, Vec::new())),
+    }
+}
+
+/// Places the nominal robot `robot` in the measurement frame of `measurements`.
+///
+/// # Errors
+/// If the measurements do not tell where it stands.
+pub fn real_arm(real: &RealCell, robot: (Arm, Vec<String>), measurements: &[Measurement]) -> Result<RealArm, SessionError> {
+    let attitude = measurements.iter().all(|measurement| measurement.attitude_xyzw.is_some());
+    let sensor = Sensor {
+        position_in_base: nalgebra::Point3::origin(),
+        position_sigma_m: real.position_sigma_m,
+        position_sigma_per_m: 0.0,
+        attitude_sigma_rad: attitude.then_some(real.attitude_sigma_rad),
+        temperature_sigma_k: 0.0,
+    };
+    let fit: Vec<&Measurement> = measurements.iter().filter(|measurement| measurement.role == Role::Fit).collect();
+    let (nominal, notes) = robot;
+    Ok(RealArm { arm: align(&nominal, &sensor, &fit)?, sensor, notes })
+}
+
+/// Identifies a real arm and tells the listener.
+///
+/// # Errors
+/// If the measurements do not suffice, or the listener fails.
+pub fn identify_real(
+    real: &RealArm,
+    measurements: &[Measurement],
+    listener: &mut dyn Listener,
+) -> Result<Identification, SessionError> {
+    let mut identification = identify(&real.arm, &real.sensor, Weights::Noise, measurements)?;
+    let frames = "nominal means: the measurement frame and the target fitted, the robot as its file says";
+    identification.notes.push(frames.to_owned());
+    identification.notes.extend(real.notes.iter().cloned());
+    listener.take(&Event::Identified(identification.clone()))?;
+    Ok(identification)
 }
 
 /// Measures `chosen` and the scene's held-out configurations.
@@ -96,13 +170,22 @@ pub fn identify_and_tell(
     Ok(identification)
 }
 
+/// Whose recording is replayed.
+#[derive(Clone, Copy, Debug)]
+pub enum Subject<'a> {
+    /// A scene's.
+    Scene(&'a Scene),
+    /// A real arm's.
+    Real(&'a RealArm),
+}
+
 /// Recomputes what a recording holds and tells it to `listener` in the recorded order: the design from the scene, the
 /// measurements from the physics where `injected` is given (else they are taken as recorded), the identification from these.
 ///
 /// # Errors
 /// Whatever a step reports.
 pub fn replay(
-    scene: &Scene,
+    subject: Subject<'_>,
     recorded: &[Event],
     injected: Option<&Injected>,
     listener: &mut dyn Listener,
@@ -113,24 +196,22 @@ pub fn replay(
     let mut measured: Option<Vec<Measurement>> = None;
     for event in recorded {
         match event {
-            Event::Start(start) => listener.take(&Event::Start(Start {
-                version: env!("CARGO_PKG_VERSION").to_owned(),
-                command: start.command.clone(),
-                scene: start.scene.clone(),
-            }))?,
+            Event::Start(start) => {
+                listener.take(&Event::Start(start_event(&start.command, &start.scene, start.real.clone())))?;
+            }
             Event::Swarm(_) | Event::Designed(_) => {
                 // Once: the design tells all its events itself.
-                if !designed {
+                if let (false, Subject::Scene(scene)) = (designed, subject) {
                     designed = true;
                     chosen = Some(design::design(scene, listener)?.configurations);
                 }
             }
-            Event::Measured(measurement) => match injected {
-                None => {
+            Event::Measured(measurement) => match (injected, subject) {
+                (None, _) | (_, Subject::Real(_)) => {
                     listener.take(event)?;
                     measured.get_or_insert_default().push(measurement.clone());
                 }
-                Some(injected) if measured.is_none() => {
+                (Some(injected), Subject::Scene(scene)) if measured.is_none() => {
                     let planned = match &chosen {
                         Some(chosen) => plan(scene, chosen, &design::held_out(scene)?),
                         None => planned_as_recorded(recorded),
@@ -139,10 +220,14 @@ pub fn replay(
                     measured = Some(measurements);
                     truth = Some(new_truth);
                 }
-                Some(_) => {}
+                (Some(_), Subject::Scene(_)) => {}
             },
             Event::Identified(_) => {
-                identify_and_tell(scene, measured.as_deref().unwrap_or_default(), listener)?;
+                let measured = measured.as_deref().unwrap_or_default();
+                match subject {
+                    Subject::Scene(scene) => identify_and_tell(scene, measured, listener)?,
+                    Subject::Real(real) => identify_real(real, measured, listener)?,
+                };
             }
             Event::Note(_) => listener.take(event)?,
         }

@@ -27,6 +27,7 @@ pub(crate) struct Arguments {
 
 /// Options of every command.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Options of every command")]
 pub(crate) struct Global {
     /// Print one JSON object on stdout; everything else goes to stderr
     #[arg(long, global = true)]
@@ -54,7 +55,7 @@ pub(crate) enum Command {
     #[command(after_help = "Example:\n  kincal run scenes/arm8.toml --set design.count=20 --seed 7 --rerun run.rrd")]
     Run(SceneOptions),
     /// Choose the configurations to measure
-    #[command(after_help = "Example:\n  kincal design scenes/arm8.toml --set design.method=\\\"random\\\"")]
+    #[command(after_help = "Example:\n  kincal design scenes/arm8.toml --set design.method=random")]
     Design(SceneOptions),
     /// Measure configurations on the simulated arm
     #[command(after_help = "Example:\n  kincal measure scenes/arm8.toml --design recordings/arm8-design.mcap")]

@@ -9,12 +9,10 @@ use super::Outcome;
 use super::arguments::{Global, IdentifyOptions};
 use super::output::{self, Audience};
 use crate::arm::Arm;
-use crate::identification::alignment::align;
-use crate::identification::identify;
 use crate::kinematics::urdf;
-use crate::measurement::{Measurement, Role, Sensor, table};
-use crate::recording::event::{Event, Listener};
-use crate::scene::{self, SceneFile, Weights};
+use crate::measurement::{Measurement, Role, table};
+use crate::recording::event::{Event, Listener, RealCell, Start};
+use crate::scene::{self, SceneFile};
 use crate::{recording, report, session};
 
 pub(crate) fn command(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outcome> {
@@ -55,28 +53,43 @@ fn from_table(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outc
     {
         ensure!((1e-6..=1e6).contains(&value), "{name} {value}: a positive number is needed, from 0.000001 to 1000000");
     }
-    let nominal = robot_of(robot, options)?;
-    let measurements = measurements_of(&options.input, nominal.joint_count(), global)?;
-    let measurements = with_evaluation(measurements, options, nominal.joint_count())?;
-    let attitude = measurements.iter().all(|measurement| measurement.attitude_xyzw.is_some());
-    let sensor = Sensor {
-        position_in_base: nalgebra::Point3::origin(),
-        position_sigma_m: options.position_noise_um * 1e-6,
-        position_sigma_per_m: 0.0,
-        attitude_sigma_rad: attitude.then_some(options.attitude_noise_deg.to_radians()),
-        temperature_sigma_k: 0.0,
-    };
-    let fit: Vec<&Measurement> = measurements.iter().filter(|measurement| measurement.role == Role::Fit).collect();
-    let arm = align(&nominal, &sensor, &fit).with_context(|| options.input.display().to_string())?;
-    let identification = identify(&arm, &sensor, Weights::Noise, &measurements)?;
+    let (start, real) = described(robot, options)?;
+    let nominal = session::real_robot(&start, &real).with_context(|| robot.display().to_string())?;
+    let joint_count = nominal.0.joint_count();
+    let measurements = measurements_of(&options.input, joint_count, global)?;
+    let measurements = with_evaluation(measurements, options, joint_count)?;
+    let real = session::real_arm(&real, nominal, &measurements).with_context(|| options.input.display().to_string())?;
+
     let stem = input_stem(&options.input, "-identified");
-    let mut identification = identification;
-    identification.notes.push(
-        "nominal means: the measurement frame and the target fitted, the robot as its file says; no recording is written for a table"
-            .to_owned(),
-    );
-    std::fs::create_dir_all(&global.out).with_context(|| format!("creating {}", global.out.display()))?;
-    conclude(global, options, &arm, &identification, None, &stem)
+    let mut audience = Audience::open(global, &real.arm, Some(&stem), &stem)?;
+    audience.take(&Event::Start(start))?;
+    for measurement in &measurements {
+        audience.take(&Event::Measured(measurement.clone()))?;
+    }
+    let identification = session::identify_real(&real, &measurements, &mut audience)?;
+    let recording = audience.finish()?;
+    conclude(global, options, &real.arm, &identification, recording.as_deref(), &stem)
+}
+
+/// The first event of a table's recording: the robot as its file stands, and the sensor as declared.
+fn described(robot: &Path, options: &IdentifyOptions) -> anyhow::Result<(Start, RealCell)> {
+    let is_scene = robot.extension().is_some_and(|extension| extension == "toml");
+    let scene = if is_scene { scene::read(robot)?.public_toml()? } else { String::new() };
+    let urdf = if is_scene {
+        None
+    } else {
+        // Read as a file first: its errors name lines.
+        urdf::read(robot, options.base_link.as_deref(), options.tip_link.as_deref())?;
+        Some(std::fs::read_to_string(robot).with_context(|| robot.display().to_string())?)
+    };
+    let real = RealCell {
+        urdf,
+        base_link: options.base_link.clone(),
+        tip_link: options.tip_link.clone(),
+        position_sigma_m: options.position_noise_um * 1e-6,
+        attitude_sigma_rad: options.attitude_noise_deg.to_radians(),
+    };
+    Ok((session::start_event("identify", &scene, Some(real.clone())), real))
 }
 
 fn conclude(
@@ -199,13 +212,6 @@ fn check_joints(path: &Path, measurements: &[Measurement], joint_count: usize) -
         path.display()
     );
     Ok(())
-}
-
-fn robot_of(path: &Path, options: &IdentifyOptions) -> anyhow::Result<Arm> {
-    if path.extension().is_some_and(|extension| extension == "toml") {
-        return Ok(scene::read(path)?.scene.arm);
-    }
-    Ok(urdf::read(path, options.base_link.as_deref(), options.tip_link.as_deref())?.arm)
 }
 
 /// Refuses `--base-link` and `--tip-link` where they would do nothing.

@@ -7,7 +7,7 @@ use super::Outcome;
 use super::arguments::{Global, MeasureOptions};
 use super::output::{self, Audience};
 use crate::recording::event::Event;
-use crate::{recording, session};
+use crate::{recording, report, session};
 
 pub(crate) fn command(global: &Global, options: &MeasureOptions) -> anyhow::Result<Outcome> {
     let file = output::scene(global, &options.scene)?;
@@ -43,24 +43,14 @@ pub(crate) fn command(global: &Global, options: &MeasureOptions) -> anyhow::Resu
     let recording = audience.finish()?;
     super::run::truth_file(&file, &truth)?.write(&truth_path)?;
 
-    let settled = truth.poses.iter().filter(|pose| pose.settled).count();
-    let worst = truth.poses.iter().map(|pose| pose.settling_error_m).fold(0.0, f64::max);
-    let steps: usize = truth.poses.iter().map(|pose| pose.settling_steps).sum();
-    output::show(
-        global,
-        &format!(
-            "{} poses measured, {settled} settled; largest settling error {:.3} µm, {:.1} steps per pose",
-            measurements.len(),
-            worst * 1e6,
-            steps as f64 / measurements.len().max(1) as f64
-        ),
-    )?;
+    let settling = report::settling(&truth);
+    output::show(global, &settling.text)?;
     if let Some(recording) = &recording {
         output::show(global, &format!("Recording   {}\nTruth       {}", recording.display(), truth_path.display()))?;
     }
     output::show_json(
         global,
-        &json!({ "poses": measurements.len(), "settled": settled, "recording": recording, "truth": truth_path }),
+        &json!({ "poses": measurements.len(), "settled": settling.settled, "recording": recording, "truth": truth_path }),
     )?;
-    Ok(if settled == measurements.len() { Outcome::Good } else { Outcome::Bad })
+    Ok(if settling.settled == measurements.len() { Outcome::Good } else { Outcome::Bad })
 }

@@ -22,7 +22,11 @@ pub(crate) fn scene(global: &Global, options: &SceneOptions) -> anyhow::Result<S
         let Some((key, value)) = assignment.split_once('=') else {
             bail!("--set {assignment}: KEY=VALUE is needed, such as design.count=20");
         };
-        file.set(key.trim(), value.trim())?;
+        let value = value.trim();
+        // A shell takes the quotes away: what is no TOML value is a text.
+        let is_toml = toml::from_str::<toml::Table>(&format!("value = {value}")).is_ok();
+        let text = if is_toml { value.to_owned() } else { toml::Value::String(value.to_owned()).to_string() };
+        file.set(key.trim(), &text)?;
     }
     if let Some(seed) = global.seed {
         file.set_seed(seed)?;
@@ -168,6 +172,13 @@ impl Listener for Audience {
         }
         Ok(())
     }
+}
+
+/// A progress bar of `length` steps for people at a terminal; hidden for everyone else.
+pub(crate) fn progress(global: &Global, what: &'static str, length: u64) -> ProgressBar {
+    let progress = Progress::new(!global.quiet && std::io::stderr().is_terminal());
+    progress.start(what, length);
+    progress.bar
 }
 
 struct Progress {

@@ -9,16 +9,32 @@ use super::output::{self, Audience};
 use crate::recording::compare::Comparer;
 use crate::recording::event::{Event, Listener, ListenerError};
 use crate::recording::truth_file::TruthFile;
-use crate::{recording, scene, session};
+use crate::session::{self, Subject};
+use crate::{recording, scene};
 
 pub(crate) fn command(global: &Global, options: &ReplayOptions) -> anyhow::Result<Outcome> {
     let path = &options.recording;
     let recorded = recording::read::read(path)?;
-    let file = scene::parse(&recorded.start.scene, &format!("{} (scene)", path.display()))?;
-    let scene = &file.scene;
+    let measurements = recorded.events.iter().filter_map(|event| match event {
+        Event::Measured(measurement) => Some(measurement.clone()),
+        _ => None,
+    });
+    let (file, real) = match &recorded.start.real {
+        Some(real) => {
+            let robot = session::real_robot(&recorded.start, real)?;
+            (None, Some(session::real_arm(real, robot, &measurements.collect::<Vec<_>>())?))
+        }
+        None => (Some(scene::parse(&recorded.start.scene, &format!("{} (scene)", path.display()))?), None),
+    };
+    let (subject, arm, name) = match (&file, &real) {
+        (Some(file), _) => (Subject::Scene(&file.scene), &file.scene.arm, file.scene.name.clone()),
+        (None, Some(real)) => (Subject::Real(real), &real.arm, real.arm.name.clone()),
+        (None, None) => anyhow::bail!("{} names neither a scene nor a robot", path.display()),
+    };
 
     let truth = options.truth.as_ref().map(|truth| -> anyhow::Result<_> {
         let truth_file = TruthFile::read(truth)?;
+        let Subject::Scene(scene) = subject else { anyhow::bail!("--truth: a recording of a real arm has no truth file") };
         ensure!(
             truth_file.scene == scene.name && truth_file.seed == scene.seed,
             "{} belongs to scene `{}` with seed {}, the recording to `{}` with seed {}: give the truth file of this run",
@@ -35,10 +51,10 @@ pub(crate) fn command(global: &Global, options: &ReplayOptions) -> anyhow::Resul
     let truth = truth.transpose()?;
 
     let mut replayer = Replayer {
-        comparer: Comparer::open(path, &scene.arm)?,
-        audience: Audience::open(global, &scene.arm, None, &format!("replay of {}", scene.name))?,
+        comparer: Comparer::open(path, arm)?,
+        audience: Audience::open(global, arm, None, &format!("replay of {name}"))?,
     };
-    let recomputed = session::replay(scene, &recorded.events, truth.as_ref().map(|(injected, _)| injected), &mut replayer);
+    let recomputed = session::replay(subject, &recorded.events, truth.as_ref().map(|(injected, _)| injected), &mut replayer);
     let cut = recorded.cut.is_some();
     let new_truth = match recomputed {
         Ok(truth) => truth,

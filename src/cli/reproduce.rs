@@ -15,7 +15,10 @@ pub(crate) fn command(global: &Global, options: &ReproduceOptions) -> anyhow::Re
     let injected = output::injected(&file, &options.arm)?;
     match options.item {
         Item::CountError => {
-            let rows = experiments::count_error::run(&file.scene, injected, options.trials as usize)?;
+            let trials = options.trials as usize;
+            let bar = output::progress(global, "calibrating", (experiments::count_error::ROWS * trials) as u64);
+            let rows = experiments::count_error::run(&file.scene, injected, trials, &|| bar.inc(1))?;
+            bar.finish_and_clear();
             output::show(global, &format!("{}\n{}", file.scene.arm_note, report::count_error(&rows)))?;
             output::show_json(global, &json!({ "item": "count-error", "arm": file.scene.arm.name, "rows": rows }))?;
         }

@@ -16,6 +16,9 @@ use crate::session::SessionError;
 
 const PUBLISHED: &str = include_str!("../../tests/reference/chen2019-table4.toml");
 
+/// Rows of Table 4.
+pub const ROWS: usize = 4;
+
 /// One row of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
@@ -59,11 +62,11 @@ struct PublishedRow {
 }
 
 /// Calibrates `trials` times with random configurations for each number of configurations of Table 4. Every trial has its own true
-/// arm, configurations and noise, drawn from the scene's seed and the trial's number.
+/// arm, configurations and noise, drawn from the scene's seed and the trial's number. `done` is called after each.
 ///
 /// # Errors
 /// Whatever a step reports.
-pub fn run(scene: &Scene, injected: &Injected, trials: usize) -> Result<Vec<Row>, SessionError> {
+pub fn run(scene: &Scene, injected: &Injected, trials: usize, done: &(dyn Fn() + Sync)) -> Result<Vec<Row>, SessionError> {
     // The file is part of the program; a test parses it.
     let published = toml::from_str::<Published>(PUBLISHED).map_or_else(|_| Vec::new(), |published| published.row);
     published
@@ -71,7 +74,7 @@ pub fn run(scene: &Scene, injected: &Injected, trials: usize) -> Result<Vec<Row>
         .map(|published| {
             let results: Vec<Option<[f64; 3]>> = (0..trials)
                 .into_par_iter()
-                .map(|trial| one(scene, injected, published.count, trial))
+                .map(|trial| one(scene, injected, published.count, trial).inspect(|_| done()))
                 .collect::<Result<_, _>>()?;
             let converged: Vec<[f64; 3]> = results.iter().copied().flatten().collect();
             let mean = |component: usize| Mean::of(converged.iter().map(|result| result[component]));
@@ -101,11 +104,9 @@ fn one(scene: &Scene, injected: &Injected, count: usize, trial: usize) -> Result
     let (measurements, _) = measure(&scene, injected, &planned, &mut Nobody)?;
     let result = identify(&scene.arm, &scene.sensor, scene.weights, &measurements)?;
     Ok(match (result.converged, result.held_out, result.held_out_nominal) {
-        (true, Some(after), Some(before)) => Some([
-            after.position_m.mean,
-            after.rotation_rad.map_or(0.0, |rotation| rotation.mean),
-            before.position_m.mean,
-        ]),
+        (true, Some(after), Some(before)) => {
+            Some([after.position_m.mean, after.rotation_rad.map_or(0.0, |rotation| rotation.mean), before.position_m.mean])
+        }
         _ => None,
     })
 }
@@ -138,5 +139,6 @@ mod tests {
     fn the_published_table_is_there() {
         let published: Published = toml::from_str(PUBLISHED).unwrap();
         assert_eq!(published.row.iter().map(|row| row.count).collect::<Vec<_>>(), [8, 20, 60, 200]);
+        assert_eq!(published.row.len(), ROWS);
     }
 }

@@ -130,12 +130,18 @@ impl Chain {
     }
 
     /// The chain seen from a measurement frame: six parameters `base_x` … `base_roll` before everything else, and six parameters
-    /// `target_x` … of the target on the tool after everything else, all zero. Frames of these names must not be there yet.
+    /// `target_x` … of the target on the tool after everything else, all zero; `measurement_x` … and `target_on_tool_x` … where the
+    /// chain has parameters of these names already.
     #[must_use]
     pub fn in_measurement_frame(&self) -> Chain {
+        let free = |preferred: &'static str, other: &'static str| {
+            let taken = |name: &str| name == preferred || name.strip_prefix(preferred).is_some_and(|rest| rest.starts_with('_'));
+            let names = self.parameters.iter().map(|parameter| parameter.name.as_str()).chain(self.frame_names());
+            if names.into_iter().any(taken) { other } else { preferred }
+        };
         let mut chain = Chain::new();
-        chain.frame("measurement");
-        chain.six_parameters("base", [0.0; 3], [0.0; 3]);
+        chain.frame(free("measurement", "measurement_frame"));
+        chain.six_parameters(free("base_x", "measurement_x").trim_end_matches("_x"), [0.0; 3], [0.0; 3]);
         let shift = chain.parameters.len();
         chain.steps.extend(self.steps.iter().cloned().map(|step| match step {
             Step::Rotate { axis, parameter } => Step::Rotate { axis, parameter: parameter + shift },
@@ -144,8 +150,9 @@ impl Chain {
         }));
         chain.parameters.extend(self.parameters.iter().cloned());
         chain.joints.clone_from(&self.joints);
-        chain.six_parameters("target", [0.0; 3], [0.0; 3]);
-        chain.frame("target");
+        let target = free("target", "target_on_tool");
+        chain.six_parameters(target, [0.0; 3], [0.0; 3]);
+        chain.frame(target);
         chain
     }
 

@@ -41,7 +41,7 @@ impl Subspace {
     /// marks are dropped first.
     ///
     /// The rank comes from the singular values of the column-scaled Jacobian. Columns are then taken one by one: of those whose
-    /// part outside the span of the columns taken so far is at least [`NEARLY_BEST`] of the largest such part, the first. Parts
+    /// part outside the span of the columns taken so far is at least 0.7 of the largest such part, the first. Parts
     /// are compared per metre and radian: of a target's offset and the angle of the joint that it nearly lies on, the offset is
     /// taken, for a parameter that hardly moves the poses can stand in for one that does only through absurd values. The answer
     /// does not hang on which of two nearly equal columns is larger.

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use foxglove::messages::{
-    Color, CubePrimitive, CylinderPrimitive, FrameTransform, FrameTransforms, Log, PoseInFrame, PosesInFrame, Quaternion,
-    SceneEntity, SceneUpdate, SpherePrimitive, Timestamp, Vector3, log,
+    Color, CubePrimitive, CylinderPrimitive, FrameTransform, FrameTransforms, JointState, JointStates, Log, PoseInFrame,
+    PosesInFrame, Quaternion, SceneEntity, SceneUpdate, SpherePrimitive, Timestamp, Vector3, log,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -189,6 +189,14 @@ impl Encoder {
         };
         let attitude = nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(qw, qx, qy, qz));
         self.arm_points(&measurement.joints, Some(&Pose::from_parts([x, y, z].into(), attitude)), messages);
+        let readings = self.arm.chain.joints.iter().zip(&measurement.joints);
+        let joints = readings.map(|(joint, value)| JointState {
+            name: joint.name.clone(),
+            position: Some(*value),
+            ..JointState::default()
+        });
+        let timestamp = Some(timestamp(self.now_ns));
+        messages.protobuf(Topic::JointReadings, &JointStates { timestamp, joints: joints.collect() });
         messages.protobuf(Topic::PoseMeasured, &self.pose_in_frame(measured));
         messages.protobuf(Topic::PoseNominal, &self.pose_in_frame(pose(&self.nominal.forward(&measurement.joints))));
         self.readings.insert(measurement.index, measurement.joints.clone());

@@ -28,8 +28,30 @@ pub struct Start {
     pub version: String,
     /// The command whose run this is: `run`, `design`, `measure`, `identify`.
     pub command: String,
-    /// Public part of the scene, as TOML: whatever is needed to repeat the run but the truth.
+    /// Public part of the scene, as TOML: whatever is needed to repeat the run but the truth. Empty where a real arm was measured and
+    /// its URDF is all there is.
     pub scene: String,
+    /// The real cell, where measurements come from a table.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub real: Option<RealCell>,
+}
+
+/// What is known of a real cell besides its measurements.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct RealCell {
+    /// Nominal robot as URDF; absent where it is the scene's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub urdf: Option<String>,
+    /// Link of the URDF at which the arm begins, if not its root.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base_link: Option<String>,
+    /// Link of the URDF that carries the target, if not its only leaf.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tip_link: Option<String>,
+    /// Declared position noise, one sigma per axis, m.
+    pub position_sigma_m: f64,
+    /// Declared attitude noise, one sigma per axis, rad; unused where only positions were measured.
+    pub attitude_sigma_rad: f64,
 }
 
 /// Whoever listens to a run.

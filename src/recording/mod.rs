@@ -6,9 +6,9 @@
 pub mod compare;
 pub mod encode;
 pub mod event;
-pub mod truth_file;
 pub mod read;
 pub mod topic;
+pub mod truth_file;
 pub mod write;
 
 mod cloud;

@@ -152,7 +152,8 @@ mod tests {
         }
         for point in at(Geometry::Box { half_extents: [0.1, 0.2, 0.3] }) {
             let local = point - Vector3::x();
-            let on_faces = [(local.x, 0.1), (local.y, 0.2), (local.z, 0.3)].iter().filter(|(x, h)| (x.abs() - h).abs() < 1e-12).count();
+            let on_faces =
+                [(local.x, 0.1), (local.y, 0.2), (local.z, 0.3)].iter().filter(|(x, h)| (x.abs() - h).abs() < 1e-12).count();
             assert!(on_faces >= 2, "{point} is on no edge");
         }
     }

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use foxglove::Encode;
-use foxglove::messages::{FrameTransforms, Log, PointCloud, PoseInFrame, PosesInFrame, SceneUpdate};
+use foxglove::messages::{FrameTransforms, JointStates, Log, PointCloud, PoseInFrame, PosesInFrame, SceneUpdate};
 
 /// A topic of a recording. Poses and points are in the arm's root frame (`base_link`, or `world` where there is one), m.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -29,6 +29,8 @@ pub enum Topic {
     Chosen,
     /// A measured configuration.
     Measurement,
+    /// Its joint readings, by joint name.
+    JointReadings,
     /// Its measured tool pose; identity attitude where the sensor sees positions only.
     PoseMeasured,
     /// Its tool pose at the joint readings (nominal arm).
@@ -58,7 +60,7 @@ pub struct Schema {
 
 impl Topic {
     /// Every topic, in the order of a run.
-    pub const ALL: [Topic; 17] = [
+    pub const ALL: [Topic; 18] = [
         Topic::Run,
         Topic::Shapes,
         Topic::ArmPoints,
@@ -69,6 +71,7 @@ impl Topic {
         Topic::Design,
         Topic::Chosen,
         Topic::Measurement,
+        Topic::JointReadings,
         Topic::PoseMeasured,
         Topic::PoseNominal,
         Topic::Identification,
@@ -92,6 +95,7 @@ impl Topic {
             Topic::Design => "/design/outcome",
             Topic::Chosen => "/design/chosen",
             Topic::Measurement => "/measurement",
+            Topic::JointReadings => "/measurement/joints",
             Topic::PoseMeasured => "/measurement/pose_measured",
             Topic::PoseNominal => "/measurement/pose_nominal",
             Topic::Identification => "/identification",
@@ -125,12 +129,11 @@ impl Topic {
             Topic::Identification => "kincal.Identification",
             Topic::Shapes => "foxglove.SceneUpdate",
             Topic::Transforms => "foxglove.FrameTransforms",
-            Topic::ArmPoints
-            | Topic::SwarmEndPoints
-            | Topic::BestEndPoints
-            | Topic::ResidualsBefore
-            | Topic::ResidualsAfter => "foxglove.PointCloud",
+            Topic::ArmPoints | Topic::SwarmEndPoints | Topic::BestEndPoints | Topic::ResidualsBefore | Topic::ResidualsAfter => {
+                "foxglove.PointCloud"
+            }
             Topic::Chosen | Topic::PosesPredicted => "foxglove.PosesInFrame",
+            Topic::JointReadings => "foxglove.JointStates",
             Topic::PoseMeasured | Topic::PoseNominal => "foxglove.PoseInFrame",
             Topic::Log => "foxglove.Log",
         }
@@ -145,6 +148,7 @@ impl Topic {
         }
         let schema = match self.schema_name() {
             "foxglove.SceneUpdate" => SceneUpdate::get_schema(),
+            "foxglove.JointStates" => JointStates::get_schema(),
             "foxglove.FrameTransforms" => FrameTransforms::get_schema(),
             "foxglove.PointCloud" => PointCloud::get_schema(),
             "foxglove.PosesInFrame" => PosesInFrame::get_schema(),

@@ -86,6 +86,35 @@ fn stop(reason: StopReason) -> &'static str {
     }
 }
 
+/// How the poses settled in the simulator.
+pub struct SettlingReport {
+    /// Poses that settled within the tolerances.
+    pub settled: usize,
+    /// A line for people.
+    pub text: String,
+}
+
+/// Tells how the poses of a run settled.
+#[must_use]
+pub fn settling(truth: &crate::cell::Truth) -> SettlingReport {
+    let poses = &truth.poses;
+    let settled = poses.iter().filter(|pose| pose.settled).count();
+    let worst = poses.iter().map(|pose| pose.settling_error_m).fold(0.0, f64::max);
+    let steps: usize = poses.iter().map(|pose| pose.settling_steps).sum();
+    let undecided = poses.iter().filter(|pose| pose.seats.iter().any(|seat| !seat.undecided.is_empty())).count();
+    let count = poses.len();
+    let mut text = format!(
+        "{count} poses simulated, {settled} settled; largest settling error {:.4} µm, {:.1} steps per pose",
+        worst * 1e6,
+        steps as f64 / count.max(1) as f64
+    );
+    if undecided > 0 {
+        text.push_str(&format!("; in {undecided} some play is not decided by the load and rests in its middle"));
+    }
+    text.push_str(".\n");
+    SettlingReport { settled, text }
+}
+
 /// Errors before and after, and how the fit went.
 #[must_use]
 pub fn identification(identification: &Identification) -> String {
@@ -98,17 +127,7 @@ pub fn identification(identification: &Identification) -> String {
     };
     add("fitted", Some(&identification.nominal), Some(&identification.fitted));
     add("held out", identification.held_out_nominal.as_ref(), identification.held_out.as_ref());
-    let header = [
-        "configurations, model",
-        "position mean (mm)",
-        "RMS",
-        "min",
-        "max",
-        "attitude mean (°)",
-        "RMS",
-        "min",
-        "max",
-    ];
+    let header = ["configurations, model", "position mean (mm)", "RMS", "min", "max", "attitude mean (°)", "RMS", "min", "max"];
     let mut text = table(&header, rows);
     let dropped = identification.parameters.iter().filter(|parameter| parameter.dropped).count();
     text.push_str(&format!(
@@ -188,7 +207,8 @@ pub fn count_error(rows: &[crate::experiments::count_error::Row]) -> String {
     let cells = rows
         .iter()
         .map(|row| {
-            let mut cells = vec![row.count.to_string(), number(row.nominal_position_m.mean * 1e3), number(row.paper_position_m * 1e3)];
+            let mut cells =
+                vec![row.count.to_string(), number(row.nominal_position_m.mean * 1e3), number(row.paper_position_m * 1e3)];
             cells.extend(interval(&row.position_m, 1e3));
             cells.push(number(row.paper_attitude_rad * degrees));
             cells.extend(interval(&row.attitude_rad, degrees));

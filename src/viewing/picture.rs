@@ -126,7 +126,7 @@ impl Picture {
         for value in self.body.arm().chain.nominal() {
             hash.update(value.to_le_bytes());
         }
-        if let Event::Start(Start { version, command, scene }) = first {
+        if let Event::Start(Start { version, command, scene, .. }) = first {
             for text in [version, command, scene] {
                 hash.update(text.len().to_le_bytes());
                 hash.update(text.as_bytes());
