@@ -1,6 +1,6 @@
 //! `kincal export`: a robot or measurements in another format.
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use serde_json::json;
 
 use super::Outcome;
@@ -10,7 +10,7 @@ use super::output;
 use crate::kinematics::urdf;
 use crate::measurement::{Measurement, table};
 use crate::recording::event::Event;
-use crate::{recording, scene};
+use crate::{recording, scene, session};
 
 pub(crate) fn command(global: &Global, options: &ExportOptions) -> anyhow::Result<Outcome> {
     let path = &options.input;
@@ -48,18 +48,22 @@ fn from_recording(global: &Global, options: &ExportOptions) -> anyhow::Result<(&
         }
         output::note(global, &format!("note: {cut}"));
     }
-    let file = scene::parse(&recording.start.scene, &format!("{} (scene)", path.display()))?;
+    let start = &recording.start;
+    let scene = || scene::parse(&start.scene, &format!("{} (scene)", path.display()));
+    let measured: Vec<Measurement> = recording
+        .events
+        .iter()
+        .filter_map(|event| match event {
+            Event::Measured(measurement) => Some(measurement.clone()),
+            _ => None,
+        })
+        .collect();
     match options.to {
-        Format::Toml => Ok(("public.toml", file.public_toml()?)),
+        Format::Toml if start.scene.is_empty() => {
+            bail!("{} is a recording of a real arm and holds no scene; export its urdf or its csv", path.display())
+        }
+        Format::Toml => Ok(("public.toml", scene()?.public_toml()?)),
         Format::Csv => {
-            let measured: Vec<Measurement> = recording
-                .events
-                .iter()
-                .filter_map(|event| match event {
-                    Event::Measured(measurement) => Some(measurement.clone()),
-                    _ => None,
-                })
-                .collect();
             if measured.is_empty() {
                 bail!("{} holds no measurements", path.display());
             }
@@ -70,7 +74,13 @@ fn from_recording(global: &Global, options: &ExportOptions) -> anyhow::Result<(&
                 Event::Identified(identification) => Some(identification),
                 _ => None,
             });
-            let arm = &file.scene.arm;
+            let arm = &match &start.real {
+                Some(real) => {
+                    let robot = session::real_robot(start, real).with_context(|| path.display().to_string())?;
+                    session::real_arm(real, robot, &measured).with_context(|| path.display().to_string())?.arm
+                }
+                None => scene()?.scene.arm,
+            };
             let text = match identified {
                 Some(identification) => {
                     let values: Vec<f64> = identification.parameters.iter().map(|parameter| parameter.identified).collect();

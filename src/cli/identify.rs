@@ -12,8 +12,7 @@ use crate::arm::Arm;
 use crate::kinematics::urdf;
 use crate::measurement::{Measurement, Role, table};
 use crate::recording::event::{Event, Listener, RealCell, Start};
-use crate::scene::{self, SceneFile};
-use crate::{recording, report, session};
+use crate::{recording, report, scene, session};
 
 pub(crate) fn command(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outcome> {
     if is_recording(&options.input) { from_recording(global, options) } else { from_table(global, options) }
@@ -26,7 +25,12 @@ fn from_recording(global: &Global, options: &IdentifyOptions) -> anyhow::Result<
         "--robot {}: a recording carries its own nominal arm; give --robot with a table (.csv) only",
         options.robot.as_deref().unwrap_or(Path::new("")).display()
     );
-    let (file, measurements) = recorded(global, &options.input, options.partial)?;
+    let (start, measurements) = recorded(global, &options.input, options.partial)?;
+    if let Some(real) = start.real {
+        let start = session::start_event("identify", &start.scene, Some(real.clone()));
+        return real_cell(global, options, start, &real, &options.input, measurements);
+    }
+    let file = scene::parse(&start.scene, &format!("{} (scene)", options.input.display()))?;
     let scene = &file.scene;
     let measurements = with_evaluation(measurements, options, scene.arm.joint_count())?;
 
@@ -54,11 +58,24 @@ fn from_table(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outc
         ensure!((1e-6..=1e6).contains(&value), "{name} {value}: a positive number is needed, from 0.000001 to 1000000");
     }
     let (start, real) = described(robot, options)?;
-    let nominal = session::real_robot(&start, &real).with_context(|| robot.display().to_string())?;
+    let measurements = measurements_of(&options.input, global)?;
+    real_cell(global, options, start, &real, robot, measurements)
+}
+
+/// Identifies a real arm. `start` is the first event of the recording, `robot` the file that the nominal arm comes from.
+fn real_cell(
+    global: &Global,
+    options: &IdentifyOptions,
+    start: Start,
+    real: &RealCell,
+    robot: &Path,
+    measurements: Vec<Measurement>,
+) -> anyhow::Result<Outcome> {
+    let nominal = session::real_robot(&start, real).with_context(|| robot.display().to_string())?;
     let joint_count = nominal.0.joint_count();
-    let measurements = measurements_of(&options.input, joint_count, global)?;
+    check_joints(&options.input, &measurements, joint_count)?;
     let measurements = with_evaluation(measurements, options, joint_count)?;
-    let real = session::real_arm(&real, nominal, &measurements).with_context(|| options.input.display().to_string())?;
+    let real = session::real_arm(real, nominal, &measurements).with_context(|| options.input.display().to_string())?;
 
     let stem = input_stem(&options.input, "-identified");
     let mut audience = Audience::open(global, &real.arm, Some(&stem), &stem)?;
@@ -121,8 +138,8 @@ fn conclude(
     Ok(output::judged(identification))
 }
 
-/// The scene and the measurements of a recording.
-pub(crate) fn recorded(global: &Global, path: &Path, partial: bool) -> anyhow::Result<(SceneFile, Vec<Measurement>)> {
+/// The first event and the measurements of a recording.
+fn recorded(global: &Global, path: &Path, partial: bool) -> anyhow::Result<(Start, Vec<Measurement>)> {
     let recording = recording::read::read(path)?;
     if let Some(cut) = &recording.cut {
         if !partial {
@@ -132,10 +149,6 @@ pub(crate) fn recorded(global: &Global, path: &Path, partial: bool) -> anyhow::R
     }
     if let Some(warning) = &recording.version_warning {
         output::note(global, &format!("note: {warning}"));
-    }
-    let mut file = scene::parse(&recording.start.scene, &format!("{} (scene)", path.display()))?;
-    if let Some(seed) = global.seed {
-        file.set_seed(seed)?;
     }
     let measurements: Vec<Measurement> = recording
         .events
@@ -150,7 +163,7 @@ pub(crate) fn recorded(global: &Global, path: &Path, partial: bool) -> anyhow::R
         "{} holds no measurements; make some with `kincal measure` or `kincal run`",
         path.display()
     );
-    Ok((file, measurements))
+    Ok((recording.start, measurements))
 }
 
 /// Adds the measurements of `--evaluate` as held-out ones.
@@ -194,9 +207,8 @@ fn with_evaluation(
     Ok(measurements)
 }
 
-fn measurements_of(path: &Path, joint_count: usize, global: &Global) -> anyhow::Result<Vec<Measurement>> {
+fn measurements_of(path: &Path, global: &Global) -> anyhow::Result<Vec<Measurement>> {
     let table = table::read(path)?;
-    check_joints(path, &table.measurements, joint_count)?;
     if !table.unused_columns.is_empty() {
         output::note(global, &format!("note: an identification does not use {}", table.unused_columns.join(", ")));
     }

@@ -21,8 +21,12 @@ pub(crate) fn command(global: &Global, options: &ReplayOptions) -> anyhow::Resul
     });
     let (file, real) = match &recorded.start.real {
         Some(real) => {
-            let robot = session::real_robot(&recorded.start, real)?;
-            (None, Some(session::real_arm(real, robot, &measurements.collect::<Vec<_>>())?))
+            if let Some(cut) = &recorded.cut {
+                anyhow::bail!("{cut}; nothing was compared, because all rows of a table together say where its arm stands");
+            }
+            let robot = session::real_robot(&recorded.start, real).with_context(|| path.display().to_string())?;
+            let measurements: Vec<_> = measurements.collect();
+            (None, Some(session::real_arm(real, robot, &measurements).with_context(|| path.display().to_string())?))
         }
         None => (Some(scene::parse(&recorded.start.scene, &format!("{} (scene)", path.display()))?), None),
     };

@@ -463,7 +463,7 @@ fn plan(file: &PlanToml) -> Checked<Plan> {
     Ok(Plan {
         held_out_count: count(file.held_out_count, 100_000, "plan.held_out_count", "the reported error comes from these")?,
         held_out_exact: file.held_out_exact,
-        seconds_per_pose: positive(file.seconds_per_pose, "plan.seconds_per_pose")?,
+        seconds_per_pose: at_most(positive(file.seconds_per_pose, "plan.seconds_per_pose")?, 1e6, "plan.seconds_per_pose")?,
         reference_temperature_c,
     })
 }

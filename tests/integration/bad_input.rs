@@ -98,8 +98,9 @@ fn overrides_that_are_wrong() {
         ("desing.count=1", "no `desing` in this scene"),
         ("arm.frame[99].a_mm=1", "no `frame[99]`"),
         ("arm.frame[0].a_mm=1", "arm.frame[0].a_mm"),
-        ("design.count=", "TOML"),
-        ("design.count=many", "TOML"),
+        ("design.count=", "a whole number"),
+        ("design.count=many", "a whole number"),
+        ("design.method=ga", "pso, random"),
         ("design.count=\"40\"", "a whole number"),
         ("design.count=40.5", "a whole number"),
         ("design.count=7", "8 or more"),
@@ -281,7 +282,12 @@ fn tables_that_are_wrong() {
     refuse(&["identify", &table], &["arm8.csv is a table: give its nominal robot with --robot"]);
     refuse(&["identify", &run.text("missing.csv"), "--robot", &robot], &["missing.csv", "No such file"]);
     refuse(&["identify", &table, "--robot", &robot, "--evaluate", &run.text("missing.csv")], &["missing.csv", "No such file"]);
-    for (option, wrong) in [("--position-noise-um", "0"), ("--position-noise-um", "nan"), ("--position-noise-um", "1e-300"), ("--attitude-noise-deg", "-1")] {
+    for (option, wrong) in [
+        ("--position-noise-um", "0"),
+        ("--position-noise-um", "nan"),
+        ("--position-noise-um", "1e-300"),
+        ("--attitude-noise-deg", "-1"),
+    ] {
         refuse(&["identify", &table, "--robot", &robot, option, wrong], &[option, "a positive number"]);
     }
     refuse(&["identify", &table, "--robot", &robot, "--tip-link", "hand"], &["--tip-link", "link8, tool"]);
@@ -339,15 +345,24 @@ fn robots_that_are_wrong() {
         ("<robot name=\"r\">\n<link".to_owned(), vec!["bad.urdf"]),
         (robot(""), vec!["no joints"]),
         (robot("<link name=\"a\"/>"), vec!["no joints"]),
-        (robot(&format!("{links}{good}{}", joint("k", "revolute", "b", "a"))), vec!["bad.urdf:", "a circle of joints", "cut the loop"]),
+        (
+            robot(&format!("{links}{good}{}", joint("k", "revolute", "b", "a"))),
+            vec!["bad.urdf:", "a circle of joints", "cut the loop"],
+        ),
         (robot(&format!("{links}{}", joint("j", "floating", "a", "b"))), vec!["bad.urdf:4", "a floating joint"]),
         (robot(&format!("{links}{}", joint("j", "revolute", "a", "c"))), vec!["bad.urdf:4", "\"c\", which is not in the file"]),
         (robot(&format!("{links}{}", joint("j", "fixed", "a", "b"))), vec!["no joint that moves"]),
         (robot(&format!("{links}<link name=\"a\"/>\n{good}")), vec!["two links of this name"]),
         (robot(&format!("{links}{}", good.replace("lower=\"-1\"", "lower=\"2\""))), vec!["bad.urdf:4", "limits from 2 to 1"]),
         (robot(&format!("{links}{}", good.replace("0 0 1", "0 0 0"))), vec!["bad.urdf:4", "axis"]),
-        (robot(&format!("{links}{}", good.replace("<axis", "<origin xyz=\"0 0 nan\"/><axis"))), vec!["bad.urdf:4", "finite numbers"]),
-        (robot(&format!("{links}{}", good.replace("<axis", "<origin xyz=\"0 0 1e300\"/><axis"))), vec!["bad.urdf:4", "finite numbers"]),
+        (
+            robot(&format!("{links}{}", good.replace("<axis", "<origin xyz=\"0 0 nan\"/><axis"))),
+            vec!["bad.urdf:4", "finite numbers"],
+        ),
+        (
+            robot(&format!("{links}{}", good.replace("<axis", "<origin xyz=\"0 0 1e300\"/><axis"))),
+            vec!["bad.urdf:4", "finite numbers"],
+        ),
         (robot(&format!("{links}{good}")), vec!["8 joint columns, the robot has 1 joint"]),
     ] {
         fs::write(&bad, text).unwrap();

@@ -33,7 +33,8 @@ fn check_identification(identification: &Value) {
         check_errors(&identification[what], what);
     }
     for (kind, factor) in [("position_m", 10.0), ("rotation_rad", 10.0)] {
-        let [before, after] = ["held_out_nominal", "held_out"].map(|what| number(identification, &format!("/{what}/{kind}/mean")));
+        let [before, after] =
+            ["held_out_nominal", "held_out"].map(|what| number(identification, &format!("/{what}/{kind}/mean")));
         assert!(after * factor < before, "{kind}: {before} before, {after} after");
     }
 }
@@ -94,7 +95,9 @@ fn for_people_it_is_text_on_stdout_and_quiet_is_quiet() {
     let arguments = [&["run", "scenes/arm8.toml", "--quiet"], &crate::harness::QUICK[..]].concat();
     let ran = kincal(folder.path(), &arguments).ends(0);
     assert_eq!(ran.stderr, "");
-    for expected in ["Substitute for the lost Table 1", "held out (50), identified", "Identifiable: 36 of 45", "arm8.calibrated.urdf"] {
+    for expected in
+        ["Substitute for the lost Table 1", "held out (50), identified", "Identifiable: 36 of 45", "arm8.calibrated.urdf"]
+    {
         assert!(ran.stdout.contains(expected), "{expected}: {}", ran.stdout);
     }
     assert!(!ran.stdout.contains('\u{1b}'), "escape sequences in what is no terminal");
@@ -104,7 +107,8 @@ fn for_people_it_is_text_on_stdout_and_quiet_is_quiet() {
 fn a_fit_that_says_nothing_ends_with_1() {
     // True angles that have nothing to do with the nominal ones: whatever the fit ends with, it is no good answer.
     let folder = tempfile::tempdir().unwrap();
-    let arguments = [&["run", "scenes/arm8.toml", "--json", "--set", "injected.parameters.angle_deg=10000"], &crate::harness::QUICK[..]];
+    let arguments =
+        [&["run", "scenes/arm8.toml", "--json", "--set", "injected.parameters.angle_deg=10000"], &crate::harness::QUICK[..]];
     let json = kincal(folder.path(), &arguments.concat()).ends(1).json();
     assert!(json["identification"]["converged"] == false || json["identification"]["rank"] == 0);
 }

@@ -9,25 +9,25 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 /// Arguments that make a run of a shipped scene quick.
-pub const QUICK: [&str; 2] = ["--set", "design.swarm.iterations=5"];
+pub(crate) const QUICK: [&str; 2] = ["--set", "design.swarm.iterations=5"];
 
 /// What a command did.
-pub struct Ran {
-    pub code: Option<i32>,
-    pub stdout: String,
-    pub stderr: String,
-    pub arguments: String,
+pub(crate) struct Ran {
+    pub(crate) code: Option<i32>,
+    pub(crate) stdout: String,
+    pub(crate) stderr: String,
+    pub(crate) arguments: String,
 }
 
 /// The command, ready to start in the project's folder.
-pub fn command(arguments: &[&str]) -> Command {
+pub(crate) fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_kincal"));
     command.args(arguments).current_dir(env!("CARGO_MANIFEST_DIR")).stdin(Stdio::null());
     command
 }
 
 /// Runs `kincal` with `arguments` and `--out out`. It must not panic, whatever it is given.
-pub fn kincal(out: &Path, arguments: &[&str]) -> Ran {
+pub(crate) fn kincal(out: &Path, arguments: &[&str]) -> Ran {
     let mut all = arguments.to_vec();
     all.extend(["--out", out.to_str().unwrap()]);
     let output = command(&all).output().unwrap();
@@ -44,14 +44,14 @@ pub fn kincal(out: &Path, arguments: &[&str]) -> Ran {
 impl Ran {
     /// Asserts the exit code.
     #[track_caller]
-    pub fn ends(self, code: i32) -> Ran {
+    pub(crate) fn ends(self, code: i32) -> Ran {
         assert_eq!(self.code, Some(code), "kincal {}\n{}{}", self.arguments, self.stdout, self.stderr);
         self
     }
 
     /// The one object on stdout.
     #[track_caller]
-    pub fn json(&self) -> Value {
+    pub(crate) fn json(&self) -> Value {
         let value: Value = serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("{error}: {}", self.stdout));
         assert!(value.is_object());
         value
@@ -59,24 +59,24 @@ impl Ran {
 }
 
 /// A folder with a quick run of `arm8` in it.
-pub struct Run {
-    pub folder: TempDir,
-    pub json: Value,
+pub(crate) struct Run {
+    pub(crate) folder: TempDir,
+    pub(crate) json: Value,
 }
 
 impl Run {
-    pub fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
     /// A path in the folder, for an argument.
-    pub fn text(&self, name: &str) -> String {
+    pub(crate) fn text(&self, name: &str) -> String {
         self.path(name).to_str().unwrap().to_owned()
     }
 }
 
 /// A quick run of `arm8`, with more arguments.
-pub fn quick_run(more: &[&str]) -> Run {
+pub(crate) fn quick_run(more: &[&str]) -> Run {
     let folder = tempfile::tempdir().unwrap();
     let mut arguments = vec!["run", "scenes/arm8.toml", "--json", "--quiet"];
     arguments.extend(QUICK);
@@ -86,7 +86,7 @@ pub fn quick_run(more: &[&str]) -> Run {
 }
 
 /// Names in a folder, in order; none where there is no such folder.
-pub fn names(folder: &Path) -> Vec<String> {
+pub(crate) fn names(folder: &Path) -> Vec<String> {
     let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
     let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();
@@ -94,7 +94,7 @@ pub fn names(folder: &Path) -> Vec<String> {
 }
 
 /// Topic and bytes of every message of an MCAP file.
-pub fn messages(path: &Path) -> Vec<(String, Vec<u8>)> {
+pub(crate) fn messages(path: &Path) -> Vec<(String, Vec<u8>)> {
     let bytes = fs::read(path).unwrap();
     let stream = mcap::MessageStream::new(&bytes).unwrap();
     stream.map(|message| message.unwrap()).map(|message| (message.channel.topic.clone(), message.data.into_owned())).collect()
@@ -102,7 +102,7 @@ pub fn messages(path: &Path) -> Vec<(String, Vec<u8>)> {
 
 /// Writes the recording at `from` to `to`, each message as `change` makes it of topic, number within the topic, and bytes: a
 /// valid file, checksums and all.
-pub fn rewrite(from: &Path, to: &Path, mut change: impl FnMut(&str, usize, &[u8]) -> Option<Vec<u8>>) {
+pub(crate) fn rewrite(from: &Path, to: &Path, mut change: impl FnMut(&str, usize, &[u8]) -> Option<Vec<u8>>) {
     let bytes = fs::read(from).unwrap();
     let mut writer = mcap::Writer::new(fs::File::create(to).unwrap()).unwrap();
     let mut counts = std::collections::BTreeMap::<String, usize>::new();
@@ -118,22 +118,31 @@ pub fn rewrite(from: &Path, to: &Path, mut change: impl FnMut(&str, usize, &[u8]
     writer.finish().unwrap();
 }
 
-/// Changes message number `number` of the JSON topic `topic`.
-pub fn rewrite_json(from: &Path, to: &Path, topic: &str, number: usize, change: impl Fn(&mut Value)) {
+/// Changes the text of message number `number` of the JSON topic `topic`: as text, so that nothing else in it changes.
+pub(crate) fn rewrite_text(from: &Path, to: &Path, topic: &str, number: usize, change: impl Fn(&str) -> String) {
     let mut changed = false;
     rewrite(from, to, |at, count, data| {
         (at == topic && count == number).then(|| {
-            let mut value: Value = serde_json::from_slice(data).unwrap();
-            change(&mut value);
-            changed = true;
-            serde_json::to_vec(&value).unwrap()
+            let (old, new) = (std::str::from_utf8(data).unwrap(), change(std::str::from_utf8(data).unwrap()));
+            changed = old != new;
+            new.into_bytes()
         })
     });
-    assert!(changed, "no message {number} on {topic}");
+    assert!(changed, "nothing is changed in message {number} on {topic}");
+}
+
+/// Sets the number at the JSON pointer to the next larger one.
+pub(crate) fn next_up(text: &str, pointer: &str) -> String {
+    let value: Value = serde_json::from_str(text).unwrap();
+    let old = number(&value, pointer);
+    // Numbers with all their digits stand there once.
+    let [old, new] = [old, old.next_up()].map(|number| serde_json::to_string(&number).unwrap());
+    assert_eq!(text.matches(&old).count(), 1, "{old}");
+    text.replacen(&old, &new, 1)
 }
 
 /// A number somewhere in a JSON value, by its JSON pointer.
 #[track_caller]
-pub fn number(value: &Value, pointer: &str) -> f64 {
+pub(crate) fn number(value: &Value, pointer: &str) -> f64 {
     value.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("no number at {pointer}"))
 }

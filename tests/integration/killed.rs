@@ -35,7 +35,7 @@ fn a_killed_run_leaves_a_partial_recording_that_can_be_used() {
     let ran = kincal(out, &["replay", path, "--json"]).ends(2);
     assert!(ran.stderr.contains("is cut off"), "{}", ran.stderr);
     let json = ran.json();
-    assert!(json["first_difference"].is_null() && json["messages_compared"].as_u64().unwrap() > 100, "{json}");
+    assert!(json["first_difference"].is_null() && json["messages_compared"].as_u64().unwrap() > 10, "{json}");
     println!("replayed {} messages in {:?}", json["messages_compared"], begun.elapsed());
     let ran = kincal(out, &["identify", path, "--partial"]).ends(2);
     assert!(ran.stderr.contains("holds no measurements"), "{}", ran.stderr);

@@ -29,7 +29,8 @@ fn sources() -> Vec<Source> {
     assert!(files.len() > 50);
     files
         .iter()
-        .filter(|file| !file.ends_with("tests.rs") && !file.ends_with("test_arms.rs"))
+        // Files that only tests include.
+        .filter(|file| !["tests.rs", "test_arms.rs", "viewing/example.rs"].iter().any(|name| file.ends_with(name)))
         .map(|file| {
             let text = fs::read_to_string(file).unwrap();
             let mut lines = Vec::new();
@@ -56,12 +57,17 @@ fn mentions(source: &Source, name: &str) -> Vec<String> {
             !line[..at].ends_with(is_word) && !line[..at].ends_with('"') && line[at + name.len()..].starts_with("::")
         })
     };
-    source.lines.iter().filter(|(_, line)| named(line)).map(|(number, line)| format!("{}:{number}: {}", source.path, line.trim())).collect()
+    source
+        .lines
+        .iter()
+        .filter(|(_, line)| named(line))
+        .map(|(number, line)| format!("{}:{number}: {}", source.path, line.trim()))
+        .collect()
 }
 
 #[test]
 fn what_analyses_knows_nothing_of_the_physics() {
-    let analyser = ["identification", "quality", "design", "measurement", "kinematics", "recording", "report"];
+    let analyser = ["identification", "quality", "design", "measurement", "kinematics", "recording"];
     for source in sources() {
         let module = source.path.split(['/', '.']).next().unwrap();
         if !analyser.contains(&module) {
@@ -76,7 +82,8 @@ fn what_analyses_knows_nothing_of_the_physics() {
             }
         }
         if !["recording"].contains(&module) {
-            let found: Vec<_> = source.lines.iter().filter(|(_, line)| line.contains("Injected") || line.contains("truth_file")).collect();
+            let found: Vec<_> =
+                source.lines.iter().filter(|(_, line)| line.contains("Injected") || line.contains("truth_file")).collect();
             assert!(found.is_empty(), "{}: {found:?}", source.path);
         }
     }

@@ -34,9 +34,10 @@ fn what_is_injected_shows_in_the_measurements_only() {
 fn no_word_and_no_number_of_the_truth_is_in_the_recording() {
     let run = quick_run(&["--set", "injected.seed=7305550123456789"]);
     let truth: toml::Table = toml::from_str(&fs::read_to_string(run.path("arm8.truth.toml")).unwrap()).unwrap();
-    assert_eq!(truth["injected"]["seed"].as_integer(), Some(7_305_550_123_456_789));
-    let mut hidden: Vec<Vec<u8>> =
-        ["7305550123456789", "injected", "clearance", "radial", "true_value", "expansion", "truth"].map(|word| word.as_bytes().to_vec()).into();
+    assert_eq!(truth["injected"]["injected"]["seed"].as_integer(), Some(7_305_550_123_456_789));
+    let mut hidden: Vec<Vec<u8>> = ["7305550123456789", "injected", "clearance", "radial", "true_value", "expansion"]
+        .map(|word| word.as_bytes().to_vec())
+        .into();
     hidden.push(7_305_550_123_456_789u64.to_le_bytes().to_vec());
     let mut number = |value: f64| {
         hidden.push(value.to_string().into_bytes());

@@ -89,5 +89,9 @@ fn the_exported_scene_repeats_the_design() {
     let design = kincal(out, &["design", &public, "--json"]).ends(0).json();
     assert_eq!(design["design"], run.json["design"]);
     let refused = kincal(out, &["run", &public]).ends(2);
-    assert!(refused.stderr.contains("no [injected] section") && refused.stderr.contains("arm8.public.toml"), "{}", refused.stderr);
+    assert!(
+        refused.stderr.contains("no [injected] section") && refused.stderr.contains("arm8.public.toml"),
+        "{}",
+        refused.stderr
+    );
 }
