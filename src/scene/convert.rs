@@ -122,7 +122,7 @@ fn at_most(value: f64, most: f64, key: &str) -> Checked<f64> {
 
 /// A declared noise: none, or so much that its inverse square is a number to calculate with.
 fn declared_noise(value: f64, key: &str) -> Checked<f64> {
-    if value == 0.0 || value >= 1e-6 {
+    if not_negative(value, key)? == 0.0 || value >= 1e-6 {
         return Ok(value);
     }
     Err(Invalid::new(key, value.to_string(), "0, or 0.000001 or more", "give the noise of a sensor"))
