@@ -15,7 +15,7 @@ pub struct Arm {
     /// `links[0]` is the base link; `links[i]` moves with joint `i`, its frame is the chain's frame named [`Link::name`]. The
     /// last link carries the tool.
     pub links: Vec<Link>,
-    /// Bodies of the cell, fixed to the base frame: floor, mounting plate.
+    /// Bodies of the cell, fixed in the chain's first frame (the base link, or the world in which its six parameters place it).
     pub fixtures: Vec<Fixture>,
     /// Pairs of links (by index, smaller first) that are never checked against each other, besides neighbours.
     pub uncollidable: Vec<(usize, usize)>,
@@ -50,7 +50,7 @@ pub struct Inertial {
 pub struct Fixture {
     /// Name for messages.
     pub name: String,
-    /// Its shape; the frame is the arm's base.
+    /// Its shape; the frame is the chain's first.
     pub shape: Shape,
     /// Links (by index) that may touch it, such as the base link on its plate.
     pub may_touch: Vec<usize>,

@@ -24,7 +24,27 @@ pub fn stream(seed: u64, label: &str) -> Stream {
     Stream { rng: ChaCha12Rng::from_seed(hash.finalize().into()), spare_normal: None }
 }
 
-/// A seed made of a seed and another number or word: what is hidden behind `seed` cannot be computed from `with` alone.
+/// A key that cannot be computed from `public` alone.
+#[must_use]
+pub fn hidden_key(secret: &str, public: u64) -> [u8; 32] {
+    let mut hash = Sha256::new();
+    hash.update(b"kincal/hidden/1");
+    hash.update(public.to_le_bytes());
+    hash.update(secret.as_bytes());
+    hash.finalize().into()
+}
+
+/// The stream `label` of a hidden key.
+#[must_use]
+pub fn hidden_stream(key: &[u8; 32], label: &str) -> Stream {
+    let mut hash = Sha256::new();
+    hash.update(b"kincal/hidden stream/1");
+    hash.update(key);
+    hash.update(label.as_bytes());
+    Stream { rng: ChaCha12Rng::from_seed(hash.finalize().into()), spare_normal: None }
+}
+
+/// A seed made of a seed and a number, such as that of a trial.
 #[must_use]
 pub fn derive(seed: u64, with: u64) -> u64 {
     let mut hash = Sha256::new();

@@ -96,8 +96,7 @@ impl CollisionCheck {
         }
         for fixture in &arm.fixtures {
             let body = bodies.len();
-            let frame = names.iter().position(|name| *name == "base_link").filter(|_| names.first() == Some(&"world"));
-            bodies.push(Body::new(fixture.name.clone(), frame, std::slice::from_ref(&fixture.shape), &bodies));
+            bodies.push(Body::new(fixture.name.clone(), None, std::slice::from_ref(&fixture.shape), &bodies));
             for (first, link) in link_of_body.iter().enumerate() {
                 if !fixture.may_touch.contains(link) {
                     pairs.push((first, body));

@@ -73,13 +73,19 @@ pub fn run(scene: &Scene, scene_toml: &str, injected: &Injected, listener: &mut 
 /// # Errors
 /// If the listener fails.
 pub fn start(command: &str, scene_toml: &str, listener: &mut dyn Listener) -> Result<(), ListenerError> {
-    listener.take(&Event::Start(start_event(command, scene_toml, None)))
+    listener.take(&Event::Start(start_event(command, scene_toml)))
 }
 
 /// What a recording of this version begins with.
 #[must_use]
-pub fn start_event(command: &str, scene_toml: &str, real: Option<RealCell>) -> Start {
-    Start { version: env!("CARGO_PKG_VERSION").to_owned(), command: command.to_owned(), scene: scene_toml.to_owned(), real }
+pub fn start_event(command: &str, scene_toml: &str) -> Start {
+    Start {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        command: command.to_owned(),
+        scene: scene_toml.to_owned(),
+        poses: None,
+        real: None,
+    }
 }
 
 /// A real arm in the frame in which it was measured, and its sensor.
@@ -118,7 +124,7 @@ pub fn real_arm(real: &RealCell, robot: (Arm, Vec<String>), measurements: &[Meas
         position_sigma_m: real.position_sigma_m,
         position_sigma_per_m: 0.0,
         attitude_sigma_rad: attitude.then_some(real.attitude_sigma_rad),
-        temperature_sigma_k: 0.0,
+        temperature_sigma_k: None,
     };
     let fit: Vec<&Measurement> = measurements.iter().filter(|measurement| measurement.role == Role::Fit).collect();
     let (nominal, notes) = robot;
@@ -152,8 +158,8 @@ pub fn measure_design(
     chosen: &[Vec<f64>],
     listener: &mut dyn Listener,
 ) -> Result<(Vec<Measurement>, Truth), SessionError> {
-    let held_out = design::held_out(scene)?;
-    Ok(measure(scene, injected, &plan(scene, chosen, &held_out), listener)?)
+    let planned = plan(scene, chosen, &design::held_out(scene)?);
+    Ok(measure(scene, injected, &planned, planned.len(), listener)?)
 }
 
 /// Identifies the scene's arm and tells the listener.
@@ -197,7 +203,8 @@ pub fn replay(
     for event in recorded {
         match event {
             Event::Start(start) => {
-                listener.take(&Event::Start(start_event(&start.command, &start.scene, start.real.clone())))?;
+                let repeated = start_event(&start.command, &start.scene);
+                listener.take(&Event::Start(Start { poses: start.poses, real: start.real.clone(), ..repeated }))?;
             }
             Event::Swarm(_) | Event::Designed(_) => {
                 // Once: the design tells all its events itself.
@@ -216,7 +223,13 @@ pub fn replay(
                         Some(chosen) => plan(scene, chosen, &design::held_out(scene)?),
                         None => planned_as_recorded(recorded),
                     };
-                    let (measurements, new_truth) = measure(scene, injected, &planned, listener)?;
+                    // A recording that was cut off holds fewer poses than the session had.
+                    let session = recorded.iter().find_map(|event| match event {
+                        Event::Start(start) => start.poses,
+                        _ => None,
+                    });
+                    let session = session.unwrap_or(planned.len());
+                    let (measurements, new_truth) = measure(scene, injected, &planned, session, listener)?;
                     measured = Some(measurements);
                     truth = Some(new_truth);
                 }

@@ -49,10 +49,24 @@ pub fn plan(scene: &Scene, chosen: &[Vec<f64>], held_out: &[Vec<f64>]) -> Vec<Pl
     planned
 }
 
+/// Whether the scene's true arm can be simulated: to be asked before anything is written.
+///
+/// # Errors
+/// If a link has no mass, or a clearance is none.
+pub fn check(scene: &Scene, injected: &Injected) -> Result<(), PhysicsError> {
+    let parameters = truth::parameters(&scene.arm, injected, scene.seed);
+    let values: Vec<f64> = parameters.iter().map(|parameter| parameter.true_value).collect();
+    let clearances = truth::clearances(&scene.arm, injected);
+    PhysicalArm::new(&scene.arm, &values, &clearances, Settling::default()).map(drop)
+}
+
 /// Measures `planned` on the true arm that `injected` makes of the scene's, telling `listener` every measurement.
 ///
 /// Noise is drawn from streams of the hidden seed, in the order of measuring; the physics of a pose depends on nothing but the pose.
 /// Neither depends on the number of threads.
+///
+/// `session_poses` is the number of poses of the whole session, over which the temperature takes its course: that of `planned`,
+/// unless only the beginning of a session is repeated.
 ///
 /// # Errors
 /// If the arm cannot be simulated (links without mass), or the listener fails.
@@ -60,6 +74,7 @@ pub fn measure(
     scene: &Scene,
     injected: &Injected,
     planned: &[Planned],
+    session_poses: usize,
     listener: &mut dyn Listener,
 ) -> Result<(Vec<Measurement>, Truth), MeasureError> {
     let arm = &scene.arm;
@@ -67,13 +82,11 @@ pub fn measure(
     let values: Vec<f64> = parameters.iter().map(|parameter| parameter.true_value).collect();
     let clearances = truth::clearances(arm, injected);
     let new_arm = || PhysicalArm::new(arm, &values, &clearances, Settling::default());
-    // Refuses a bad arm before anything is told.
-    drop(new_arm()?);
     let mut sensor = SimulatedSensor::new(&scene.sensor, injected, scene.seed);
 
     let mut measurements = Vec::with_capacity(planned.len());
     let mut poses = Vec::with_capacity(planned.len());
-    let last = planned.len().saturating_sub(1).max(1) as f64;
+    let last = session_poses.saturating_sub(1).max(1) as f64;
     for (batch, chunk) in planned.chunks(BATCH).enumerate() {
         let settled: Vec<(Settled, Vec<f64>)> = chunk
             .par_iter()
@@ -97,7 +110,7 @@ pub fn measure(
                 role: planned.role,
                 time_s: index as f64 * scene.plan.seconds_per_pose,
                 joints: planned.joints.clone(),
-                temperatures_c: if injected.thermal.is_some() { temperatures_c } else { Vec::new() },
+                temperatures_c,
                 position_m: pose.translation.vector.into(),
                 attitude_xyzw: scene.sensor.attitude_sigma_rad.map(|_| [q.i, q.j, q.k, q.w]),
             };
@@ -120,13 +133,12 @@ struct SimulatedSensor<'a> {
 
 impl<'a> SimulatedSensor<'a> {
     fn new(declared: &'a Sensor, injected: &Injected, public_seed: u64) -> Self {
-        let hidden = truth::hidden_seed(injected, public_seed);
         SimulatedSensor {
             declared,
             noise: injected.noise,
-            position: stream(hidden, "noise/position"),
-            attitude: stream(hidden, "noise/attitude"),
-            temperature: stream(hidden, "noise/temperature"),
+            position: truth::stream(injected, public_seed, "noise/position"),
+            attitude: truth::stream(injected, public_seed, "noise/attitude"),
+            temperature: truth::stream(injected, public_seed, "noise/temperature"),
         }
     }
 
@@ -144,9 +156,13 @@ impl<'a> SimulatedSensor<'a> {
             Noise::Uniform { attitude_rad, .. } => Vector3::from_fn(|_, _| self.attitude.uniform(-attitude_rad, attitude_rad)),
             Noise::Off => Vector3::zeros(),
         };
-        let sigma_k = self.declared.temperature_sigma_k;
-        // The base link has no sensor.
-        let temperatures = rise_k.iter().skip(1).map(|rise| reference_c + rise + sigma_k * self.temperature.normal()).collect();
+        // The base link has no sensor. Whether there are others is public: nothing is told by their absence.
+        let temperatures = match self.declared.temperature_sigma_k {
+            Some(sigma_k) => {
+                rise_k.iter().skip(1).map(|rise| reference_c + rise + sigma_k * self.temperature.normal()).collect()
+            }
+            None => Vec::new(),
+        };
         if exact {
             return (*truth, temperatures);
         }

@@ -6,7 +6,7 @@ use crate::arm::Arm;
 use crate::kinematics::Quantity;
 use crate::physics::{Clearance, Seat, SeatedBy, Settled};
 use crate::scene::{Injected, ThermalProfile};
-use crate::seed::{derive, stream};
+use crate::seed::{Stream, hidden_key, hidden_stream};
 
 /// True parameters and the poses as they were before the sensor read them. Written to a file of its own, never to the recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -109,16 +109,16 @@ impl TrueSeat {
     }
 }
 
-/// Seed of everything hidden in a run: whoever knows the recording knows `public_seed`, but not the scene's hidden seed.
+/// Stream of everything hidden in a run: whoever knows the recording knows `public_seed`, but not the scene's hidden one.
 #[must_use]
-pub fn hidden_seed(injected: &Injected, public_seed: u64) -> u64 {
-    derive(injected.seed, public_seed)
+pub fn stream(injected: &Injected, public_seed: u64, label: &str) -> Stream {
+    hidden_stream(&hidden_key(&injected.seed, public_seed), label)
 }
 
 /// True parameters: nominal plus errors drawn uniformly within the scene's ranges, or as the scene gives them by name.
 #[must_use]
 pub fn parameters(arm: &Arm, injected: &Injected, public_seed: u64) -> Vec<TrueParameter> {
-    let mut stream = stream(hidden_seed(injected, public_seed), "truth/parameters");
+    let mut stream = stream(injected, public_seed, "truth/parameters");
     arm.chain
         .parameters
         .iter()

@@ -9,7 +9,7 @@ use super::Outcome;
 use super::arguments::{Global, IdentifyOptions};
 use super::output::{self, Audience};
 use crate::arm::Arm;
-use crate::kinematics::urdf;
+use crate::kinematics::{JointKind, urdf};
 use crate::measurement::{Measurement, Role, table};
 use crate::recording::event::{Event, Listener, RealCell, Start};
 use crate::{recording, report, scene, session};
@@ -27,12 +27,12 @@ fn from_recording(global: &Global, options: &IdentifyOptions) -> anyhow::Result<
     );
     let (start, measurements) = recorded(global, &options.input, options.partial)?;
     if let Some(real) = start.real {
-        let start = session::start_event("identify", &start.scene, Some(real.clone()));
+        let start = Start { real: Some(real.clone()), ..session::start_event("identify", &start.scene) };
         return real_cell(global, options, start, &real, &options.input, measurements);
     }
     let file = scene::parse(&start.scene, &format!("{} (scene)", options.input.display()))?;
     let scene = &file.scene;
-    let measurements = with_evaluation(measurements, options, scene.arm.joint_count())?;
+    let measurements = with_evaluation(measurements, options, &scene.arm)?;
 
     let stem = input_stem(&options.input, "-identified");
     let mut audience = Audience::open(global, &scene.arm, Some(&stem), &stem)?;
@@ -58,8 +58,13 @@ fn from_table(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outc
         ensure!((1e-6..=1e6).contains(&value), "{name} {value}: a positive number is needed, from 0.000001 to 1000000");
     }
     let (start, real) = described(robot, options)?;
-    let measurements = measurements_of(&options.input, global)?;
-    real_cell(global, options, start, &real, robot, measurements)
+    let table = table::read(&options.input)?;
+    if !table.unused_columns.is_empty() {
+        output::note(global, &format!("note: an identification does not use {}", table.unused_columns.join(", ")));
+    }
+    let (nominal, _) = session::real_robot(&start, &real).with_context(|| robot.display().to_string())?;
+    check_units(&options.input, &table, &nominal)?;
+    real_cell(global, options, start, &real, robot, table.measurements)
 }
 
 /// Identifies a real arm. `start` is the first event of the recording, `robot` the file that the nominal arm comes from.
@@ -74,7 +79,7 @@ fn real_cell(
     let nominal = session::real_robot(&start, real).with_context(|| robot.display().to_string())?;
     let joint_count = nominal.0.joint_count();
     check_joints(&options.input, &measurements, joint_count)?;
-    let measurements = with_evaluation(measurements, options, joint_count)?;
+    let measurements = with_evaluation(measurements, options, &nominal.0)?;
     let real = session::real_arm(real, nominal, &measurements).with_context(|| options.input.display().to_string())?;
 
     let stem = input_stem(&options.input, "-identified");
@@ -106,7 +111,7 @@ fn described(robot: &Path, options: &IdentifyOptions) -> anyhow::Result<(Start, 
         position_sigma_m: options.position_noise_um * 1e-6,
         attitude_sigma_rad: options.attitude_noise_deg.to_radians(),
     };
-    Ok((session::start_event("identify", &scene, Some(real.clone())), real))
+    Ok((Start { real: Some(real.clone()), ..session::start_event("identify", &scene) }, real))
 }
 
 fn conclude(
@@ -170,7 +175,7 @@ fn recorded(global: &Global, path: &Path, partial: bool) -> anyhow::Result<(Star
 fn with_evaluation(
     mut measurements: Vec<Measurement>,
     options: &IdentifyOptions,
-    joint_count: usize,
+    arm: &Arm,
 ) -> anyhow::Result<Vec<Measurement>> {
     let Some(other) = &options.evaluate else {
         return Ok(measurements);
@@ -186,10 +191,23 @@ fn with_evaluation(
         });
         measured.collect()
     } else {
-        table::read(other)?.measurements
+        let table = table::read(other)?;
+        check_units(other, &table, arm)?;
+        table.measurements
     };
     ensure!(!others.is_empty(), "{} holds no measurements", other.display());
-    check_joints(other, &others, joint_count)?;
+    let fitted = |row: &Measurement| {
+        let mut fit = measurements.iter().filter(|known| known.role == Role::Fit);
+        fit.any(|known| known.joints == row.joints && known.position_m == row.position_m)
+    };
+    let known = others.iter().filter(|row| fitted(row)).count();
+    ensure!(
+        known == 0,
+        "{}: {known} of its {} measurements are among those that are fitted, and can show no held-out error; give other measurements",
+        other.display(),
+        others.len()
+    );
+    check_joints(other, &others, arm.joint_count())?;
     // What is evaluated is only the other file: its rows are held out whatever they were for.
     measurements.retain(|measurement| measurement.role == Role::Fit);
     let (first_index, first_id) = (measurements.len(), measurements.iter().map(|row| row.pose_id + 1).max().unwrap_or(0));
@@ -207,16 +225,25 @@ fn with_evaluation(
     Ok(measurements)
 }
 
-fn measurements_of(path: &Path, global: &Global) -> anyhow::Result<Vec<Measurement>> {
-    let table = table::read(path)?;
-    if !table.unused_columns.is_empty() {
-        output::note(global, &format!("note: an identification does not use {}", table.unused_columns.join(", ")));
+/// Refuses lengths for joints that turn and angles for joints that slide.
+fn check_units(path: &Path, table: &table::Table, arm: &Arm) -> anyhow::Result<()> {
+    for (number, (is_length, joint)) in table.joint_is_length.iter().zip(&arm.chain.joints).enumerate() {
+        let slides = joint.kind == JointKind::Prismatic;
+        let (verb, units) = if slides { ("slides", "_m or _mm") } else { ("turns", "_rad or _deg") };
+        ensure!(
+            *is_length == slides,
+            "{}: column q{} has the unit of {}, but joint `{}` of the robot {verb}: its column must end in {units}",
+            path.display(),
+            number + 1,
+            if *is_length { "a length" } else { "an angle" },
+            joint.name
+        );
     }
-    Ok(table.measurements)
+    Ok(())
 }
 
 fn check_joints(path: &Path, measurements: &[Measurement], joint_count: usize) -> anyhow::Result<()> {
-    let found = measurements.first().map_or(joint_count, |row| row.joints.len());
+    let found = measurements.iter().map(|row| row.joints.len()).find(|found| *found != joint_count).unwrap_or(joint_count);
     ensure!(
         found == joint_count,
         "{} has {found} joint columns, the robot has {joint_count} joints: is it the right robot, and are its links from --base-link \

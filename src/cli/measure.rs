@@ -6,8 +6,8 @@ use serde_json::json;
 use super::Outcome;
 use super::arguments::{Global, MeasureOptions};
 use super::output::{self, Audience};
-use crate::recording::event::Event;
-use crate::{recording, report, session};
+use crate::recording::event::{Event, Listener, Start};
+use crate::{cell, recording, report, session};
 
 pub(crate) fn command(global: &Global, options: &MeasureOptions) -> anyhow::Result<Outcome> {
     let file = output::scene(global, &options.scene)?;
@@ -36,12 +36,14 @@ pub(crate) fn command(global: &Global, options: &MeasureOptions) -> anyhow::Resu
 
     let stem = output::stem(global, &file, "-measure");
     let truth_path = global.out.join(format!("{stem}.truth.toml"));
+    cell::measure::check(scene, injected).with_context(|| options.scene.scene.display().to_string())?;
     output::check_target(&truth_path)?;
     let mut audience = Audience::open(global, &scene.arm, Some(&stem), &stem)?;
-    session::start("measure", &file.public_toml()?, &mut audience)?;
+    let poses = Some(outcome.configurations.len() + scene.plan.held_out_count);
+    audience.take(&Event::Start(Start { poses, ..session::start_event("measure", &file.public_toml()?) }))?;
     let (measurements, truth) = session::measure_design(scene, injected, &outcome.configurations, &mut audience)?;
-    let recording = audience.finish()?;
     super::run::truth_file(&file, &truth)?.write(&truth_path)?;
+    let recording = audience.finish()?;
 
     let settling = report::settling(&truth);
     output::show(global, &settling.text)?;

@@ -48,7 +48,8 @@ pub(crate) fn command(global: &Global, options: &ReplayOptions) -> anyhow::Resul
             scene.name,
             scene.seed
         );
-        let text = toml::to_string(&truth_file.injected)?;
+        let section = toml::Table::from_iter([("injected".to_owned(), truth_file.injected.clone().into())]);
+        let text = toml::to_string(&section)?;
         let injected = scene::parse_injected(&text, &truth.display().to_string(), &scene.arm)?;
         Ok((injected, truth_file.truth()))
     });
@@ -80,6 +81,7 @@ pub(crate) fn command(global: &Global, options: &ReplayOptions) -> anyhow::Resul
     };
     let identical = comparison.identical() && truth_equal;
     let text = match &comparison.first_difference {
+        None if cut => format!("identical up to where the recording breaks off: {} messages; {physics}", comparison.compared),
         None if truth_equal => format!("identical: {} messages compared bit for bit; {physics}", comparison.compared),
         None => "the recording is identical, but the truth file's parameters or poses differ from the physics".to_owned(),
         Some(difference) => format!("different: {difference}"),

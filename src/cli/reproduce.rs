@@ -21,6 +21,9 @@ pub(crate) fn command(global: &Global, options: &ReproduceOptions) -> anyhow::Re
             bar.finish_and_clear();
             output::show(global, &format!("{}\n{}", file.scene.arm_note, report::count_error(&rows)))?;
             output::show_json(global, &json!({ "item": "count-error", "arm": file.scene.arm.name, "rows": rows }))?;
+            if rows.iter().any(|row| row.not_converged > 0) {
+                return Ok(Outcome::Bad);
+            }
         }
     }
     Ok(Outcome::Good)

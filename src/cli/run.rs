@@ -1,5 +1,6 @@
 //! `kincal run`: the whole chain.
 
+use anyhow::Context;
 use serde_json::json;
 
 use super::Outcome;
@@ -7,8 +8,7 @@ use super::arguments::{Global, SceneOptions};
 use super::output::{self, Audience};
 use crate::kinematics::urdf;
 use crate::recording::truth_file::TruthFile;
-use crate::report;
-use crate::session;
+use crate::{cell, report, session};
 
 pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result<Outcome> {
     let file = output::scene(global, options)?;
@@ -18,13 +18,15 @@ pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result
     let urdf_text = urdf::export(&scene.arm)?;
     let [truth_path, urdf_path, calibrated_path] =
         ["truth.toml", "urdf", "calibrated.urdf"].map(|extension| global.out.join(format!("{stem}.{extension}")));
+    cell::measure::check(scene, injected).with_context(|| options.scene.display().to_string())?;
     [&truth_path, &urdf_path, &calibrated_path].into_iter().try_for_each(|path| output::check_target(path))?;
 
     let mut audience = Audience::open(global, &scene.arm, Some(&stem), &stem)?;
     let run = session::run(scene, &file.public_toml()?, injected, &mut audience)?;
+    // Before the recording gets its final name, so that none is ever there without its truth.
+    truth_file(&file, &run.truth)?.write(&truth_path)?;
     let recording = audience.finish()?;
 
-    truth_file(&file, &run.truth)?.write(&truth_path)?;
     output::write(&urdf_path, &urdf_text)?;
     let calibrated: Vec<f64> = run.identification.parameters.iter().map(|parameter| parameter.identified).collect();
     output::write(&calibrated_path, &urdf::export_with(&scene.arm, &calibrated)?)?;
@@ -64,12 +66,16 @@ pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result
 
 /// The truth file of a run of `file`.
 pub(crate) fn truth_file(file: &crate::scene::SceneFile, truth: &crate::cell::Truth) -> anyhow::Result<TruthFile> {
-    let injected = file.injected_toml()?.unwrap_or_default();
+    let mut section: toml::Table = toml::from_str(&file.injected_toml()?.unwrap_or_default())?;
+    let injected = match section.remove("injected") {
+        Some(toml::Value::Table(injected)) => injected,
+        _ => toml::Table::new(),
+    };
     Ok(TruthFile {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         scene: file.scene.name.clone(),
         seed: file.scene.seed,
-        injected: toml::from_str(&injected)?,
+        injected,
         parameters: truth.parameters.clone(),
         poses: truth.poses.clone(),
     })

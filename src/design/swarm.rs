@@ -6,7 +6,8 @@
 //! iteration, as eq. 36 writes them.
 //!
 //! Added to the paper: a step is cut at the joint limits, and a configuration that would collide stays where it was, with its
-//! velocity set to zero, so that every set that is ever evaluated, and so every best, is free of collisions.
+//! velocity set to zero, so that every set that is ever evaluated, and so every best, is free of collisions (of the nominal arm: the
+//! true one is not known).
 
 use rayon::prelude::*;
 
@@ -202,7 +203,7 @@ impl Particle {
                 // It did not move, but the pull may still move it.
                 moved = true;
             } else {
-                moved |= self.position[range.clone()] != candidate;
+                moved |= self.position[range.clone()] != candidate || self.velocity[range.clone()].iter().any(|v| *v != 0.0);
                 self.position[range].copy_from_slice(&candidate);
             }
         }

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::cell::measure;
 use crate::cell::measure::plan;
@@ -33,11 +34,11 @@ pub struct Row {
     /// Calibrations that did not converge; they are left out of the means.
     pub not_converged: usize,
     /// Our mean position error over held-out configurations, m, and its 95 % interval over the trials.
-    pub position_m: Mean,
+    pub position_m: Option<Mean>,
     /// The same for the attitude, rad.
-    pub attitude_rad: Mean,
+    pub attitude_rad: Option<Mean>,
     /// Mean position error of the nominal model, m.
-    pub nominal_position_m: Mean,
+    pub nominal_position_m: Option<Mean>,
 }
 
 /// A mean over trials.
@@ -45,8 +46,8 @@ pub struct Row {
 pub struct Mean {
     /// Mean.
     pub mean: f64,
-    /// 95 % confidence interval of the mean.
-    pub interval95: [f64; 2],
+    /// 95 % confidence interval of the mean (Student); absent for a single trial.
+    pub interval95: Option<[f64; 2]>,
 }
 
 #[derive(Deserialize)]
@@ -67,9 +68,11 @@ struct PublishedRow {
 /// # Errors
 /// Whatever a step reports.
 pub fn run(scene: &Scene, injected: &Injected, trials: usize, done: &(dyn Fn() + Sync)) -> Result<Vec<Row>, SessionError> {
-    // The file is part of the program; a test parses it.
-    let published = toml::from_str::<Published>(PUBLISHED).map_or_else(|_| Vec::new(), |published| published.row);
+    // The file is part of the program, and a test parses it.
+    #[allow(clippy::expect_used, reason = "checked by a test")]
+    let published: Published = toml::from_str(PUBLISHED).expect("the published table is part of the program");
     published
+        .row
         .into_iter()
         .map(|published| {
             let results: Vec<Option<[f64; 3]>> = (0..trials)
@@ -101,7 +104,7 @@ fn one(scene: &Scene, injected: &Injected, count: usize, trial: usize) -> Result
     let chosen = sampler.draw(&mut stream(scene.seed, &format!("count_error/{count}")), count)?;
     let held_out = crate::design::held_out(&scene)?;
     let planned = plan(&scene, &split(&chosen, scene.arm.joint_count()), &held_out);
-    let (measurements, _) = measure(&scene, injected, &planned, &mut Nobody)?;
+    let (measurements, _) = measure(&scene, injected, &planned, planned.len(), &mut Nobody)?;
     let result = identify(&scene.arm, &scene.sensor, scene.weights, &measurements)?;
     Ok(match (result.converged, result.held_out, result.held_out_nominal) {
         (true, Some(after), Some(before)) => {
@@ -120,14 +123,19 @@ impl Listener for Nobody {
 }
 
 impl Mean {
-    fn of(values: impl Iterator<Item = f64> + Clone) -> Mean {
-        let count = values.clone().count().max(1) as f64;
-        let mean = values.clone().sum::<f64>() / count;
-        let variance = values.map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-        use statrs::distribution::{ContinuousCDF, StudentsT};
-        let quantile = StudentsT::new(0.0, 1.0, (count - 1.0).max(1.0)).map_or(1.96, |t| t.inverse_cdf(0.975));
-        let half = quantile * (variance / count).sqrt();
-        Mean { mean, interval95: [mean - half, mean + half] }
+    /// `None` where there are no values.
+    fn of(values: impl Iterator<Item = f64> + Clone) -> Option<Mean> {
+        let count = values.clone().count();
+        if count == 0 {
+            return None;
+        }
+        let mean = values.clone().sum::<f64>() / count as f64;
+        let interval95 = StudentsT::new(0.0, 1.0, count as f64 - 1.0).ok().map(|distribution| {
+            let variance = values.map(|value| (value - mean).powi(2)).sum::<f64>() / (count as f64 - 1.0);
+            let half = distribution.inverse_cdf(0.975) * (variance / count as f64).sqrt();
+            [mean - half, mean + half]
+        });
+        Some(Mean { mean, interval95 })
     }
 }
 

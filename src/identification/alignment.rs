@@ -46,6 +46,8 @@ pub fn align(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement]) -> Resul
 
     let mut aligned = arm.clone();
     aligned.chain = arm.chain.in_measurement_frame();
+    // Nobody knows where the cell is in the measurement frame.
+    aligned.fixtures.clear();
     let parameters = &mut aligned.chain.parameters;
     let count = parameters.len();
     let mut set = |first: usize, translation: Vector3<f64>, rotation: UnitQuaternion<f64>| {

@@ -21,6 +21,10 @@ const ROUNDING: f64 = 1e-12;
 /// A combination whose standard error would be above this (m or rad) cannot be told from this data: nobody's nominal arm is that
 /// wrong, and letting it loose only spoils the fit.
 const PLAUSIBLE_ERROR: f64 = 0.03;
+/// The residuals may make the noise look so many times as large as declared when it is told what drowns in it.
+const LARGEST_NOISE_FACTOR: f64 = 10.0;
+/// Residuals so many times the declared noise make one doubt that it is this robot.
+const FOREIGN_ROBOT: f64 = 200.0;
 /// Below this probability of the residuals under the declared noise, the noise is taken to be larger than declared.
 const DECLARED_NOISE_REJECTED: f64 = 1e-3;
 
@@ -101,8 +105,9 @@ pub fn identify(
         return Err(IdentificationError::TooFew { poses: fit.len(), equations, rank: structural, needed });
     }
 
-    // How large the noise really is shows only in the residuals, and with it which combinations drown in it.
-    let mut assumed = 1.0;
+    // How large the noise really is shows only in the residuals, and with it which combinations drown in it. Up to a limit: what
+    // is far beyond the noise is the wrong robot, not noise.
+    let mut assumed: f64 = 1.0;
     let (subspace, solution, noise, scale) = loop {
         let start = problem.linearise(&nominal);
         let subspace = Subspace::reveal(&problem.in_sigmas(&start.jacobian), &late(arm), assumed / PLAUSIBLE_ERROR);
@@ -110,13 +115,16 @@ pub fn identify(
         let noise = problem.noise_scale(&solution.values);
         let freedom = equations - subspace.rank();
         let scale = if freedom > 0 { (noise.sum_of_squares / freedom as f64).sqrt() } else { 1.0 };
-        let smaller = |scale: f64| problem.rank(&nominal, scale / PLAUSIBLE_ERROR, arm) < subspace.rank();
-        if noise.known && scale > 1.2 * assumed && scale.is_finite() && smaller(scale) {
-            assumed = scale;
+        let larger = scale.min(LARGEST_NOISE_FACTOR);
+        let smaller_rank = || problem.rank(&nominal, larger / PLAUSIBLE_ERROR, arm) < subspace.rank();
+        if noise.known && larger > 1.2 * assumed && smaller_rank() {
+            assumed = larger;
         } else {
             break (subspace, solution, noise, scale);
         }
     };
+    // The shares of the dropped parameters where the fit has ended, for large errors have turned them.
+    let subspace = subspace.at(&solution.jacobian);
     let rank = subspace.rank();
     let mut notes = Vec::new();
     if rank < structural {
@@ -132,11 +140,19 @@ pub fn identify(
         (1.., Ok(distribution)) => distribution.sf(noise.sum_of_squares),
         _ => 1.0,
     };
-    let inflated = noise.known && p_value < DECLARED_NOISE_REJECTED;
+    // Only residuals weighted by their noise have this distribution.
+    let tested = noise.known && freedom > 0 && weights == Weights::Noise;
+    let inflated = tested && p_value < DECLARED_NOISE_REJECTED;
     if inflated {
         notes.push(format!(
             "residuals are {scale:.2} times what the declared noise allows (chi-square p = {p_value:.1e}): something is not \
              modelled; standard errors are scaled by {scale:.2}, and cannot show a bias"
+        ));
+    }
+    if noise.known && scale > FOREIGN_ROBOT {
+        notes.push(format!(
+            "residuals of {scale:.0} times the declared noise are no noise: is it this robot, are the units right, and are the joint \
+             readings in the robot's order?"
         ));
     }
     if freedom == 0 {
@@ -147,6 +163,8 @@ pub fn identify(
         Ok(distribution) if inflated => distribution.inverse_cdf(0.975),
         _ => 1.959_963_984_540_054,
     };
+    // Its last digits depend on the platform's mathematics, recordings must not.
+    let quantile = (quantile * 1e9).round() * 1e-9;
     let factor = if inflated { scale } else { 1.0 };
     let standard_error = |position: usize| factor * covariance[(position, position)].max(0.0).sqrt();
 
@@ -196,12 +214,12 @@ pub fn identify(
         })
         .collect();
     Ok(Identification {
-        converged: solution.converged,
-        reason: solution.reason,
+        converged: solution.converged && rank > 0,
+        reason: if rank > 0 { solution.reason } else { "these configurations tell nothing apart".to_owned() },
         iterations: solution.steps,
         rank,
         equations,
-        residual_scale: scale,
+        residual_scale: (noise.known && freedom > 0).then_some(scale),
         parameters,
         combinations,
         nominal: errors(&fit, &at_nominal),
@@ -402,7 +420,7 @@ impl<'a> Problem<'a> {
     fn covariance(&self, jacobian: &DMatrix<f64>, subspace: &Subspace) -> DMatrix<f64> {
         let j = jacobian.select_columns(&subspace.independent);
         let rank = subspace.rank();
-        let Some(inverse) = scaled_inverse(&(j.transpose() * &j)) else {
+        let Some(inverse) = scaled_inverse(&gram(&j)) else {
             return DMatrix::from_element(rank, rank, f64::NAN);
         };
         let mut scaled = j.clone();
@@ -411,8 +429,27 @@ impl<'a> Problem<'a> {
             let part = index % self.rows_per_pose / 3;
             row *= weights.weight[part] * weights.sigma[part];
         }
-        &inverse * (scaled.transpose() * &scaled) * &inverse
+        product(&product(&inverse, &gram(&scaled)), &inverse)
     }
+}
+
+/// `matrixᵀ matrix`. Not nalgebra's product, whose kernels (and last bits) depend on the processor.
+fn gram(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    let columns = matrix.ncols();
+    let mut gram = DMatrix::zeros(columns, columns);
+    for first in 0..columns {
+        for second in 0..=first {
+            let value = matrix.column(first).dot(&matrix.column(second));
+            gram[(first, second)] = value;
+            gram[(second, first)] = value;
+        }
+    }
+    gram
+}
+
+/// `left · right`; see [`gram`].
+fn product(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
+    DMatrix::from_fn(left.nrows(), right.ncols(), |row, column| left.row(row).iter().zip(right.column(column).iter()).map(|(a, b)| a * b).sum())
 }
 
 /// Inverse of a positive definite matrix whose rows have different units.

@@ -15,8 +15,10 @@ pub struct Identification {
     pub rank: usize,
     /// Residual components fitted.
     pub equations: usize,
-    /// Root of the weighted sum of squares over the degrees of freedom: 1 where the declared noise explains the residuals.
-    pub residual_scale: f64,
+    /// Root of the sum of squared residuals, each over its declared sigma, over the degrees of freedom: 1 where the declared noise
+    /// explains the residuals. Absent where a noise is declared as zero, or nothing is left over.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub residual_scale: Option<f64>,
     /// Every parameter of the model, in column order.
     pub parameters: Vec<ParameterEstimate>,
     /// What is identifiable, one per independent parameter.
@@ -56,11 +58,14 @@ pub struct ParameterEstimate {
 }
 
 /// An identifiable combination: an independent parameter together with the share of each dropped one that it takes up.
+///
+/// What is estimated, and what the interval is about, is the value that the independent parameters take while the dropped ones
+/// stand at their nominal values and the arm's poses stay the same. To first order, at the solution, that is the expression.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Combination {
     /// Name of the independent parameter.
     pub name: String,
-    /// `name + factor · other + …`, in words.
+    /// `name + factor · other + …`, in words; factors at the solution.
     pub expression: String,
     /// Estimated change from nominal, SI.
     pub estimate: f64,

@@ -65,8 +65,8 @@ pub struct Sensor {
     pub position_sigma_per_m: f64,
     /// Attitude noise per axis, rad; `None` where the sensor sees positions only, zero where it is taken as exact.
     pub attitude_sigma_rad: Option<f64>,
-    /// Noise of the temperature sensors, K.
-    pub temperature_sigma_k: f64,
+    /// Noise of the temperature sensors on the moving links, K; `None` where there are none.
+    pub temperature_sigma_k: Option<f64>,
 }
 
 impl Sensor {

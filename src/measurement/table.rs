@@ -15,6 +15,8 @@ use super::{Measurement, Role};
 pub struct Table {
     /// Rows in the order of the file.
     pub measurements: Vec<Measurement>,
+    /// Of each joint column, whether its unit is a length.
+    pub joint_is_length: Vec<bool>,
     /// Columns that were read but that an identification does not use.
     pub unused_columns: Vec<String>,
 }
@@ -49,7 +51,7 @@ const LARGEST: f64 = 1e13;
 enum Column {
     PoseId,
     Time,
-    Joint { joint: usize, factor: f64 },
+    Joint { joint: usize, factor: f64, is_length: bool },
     Position { axis: usize, factor: f64 },
     Quaternion { component: usize },
     Role,
@@ -118,7 +120,7 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
                         .map_err(|_| wrong(line, format!("`pose_id` is `{text}`; a whole number from 0 is needed")))?;
                 }
                 Column::Time => row.time_s = number()?,
-                Column::Joint { joint, factor } => row.joints[*joint] = number()? * factor,
+                Column::Joint { joint, factor, .. } => row.joints[*joint] = number()? * factor,
                 Column::Position { axis, factor } => row.position_m[*axis] = number()? * factor,
                 Column::Quaternion { component } => {
                     let value = number()?;
@@ -154,7 +156,13 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
     }
     let unused_columns =
         header.iter().zip(&columns).filter(|(_, column)| **column == Column::Unused).map(|(name, _)| name.to_owned()).collect();
-    Ok(Table { measurements, unused_columns })
+    let mut joint_is_length = vec![false; layout.joints];
+    for column in &columns {
+        if let Column::Joint { joint, is_length, .. } = column {
+            joint_is_length[*joint] = *is_length;
+        }
+    }
+    Ok(Table { measurements, joint_is_length, unused_columns })
 }
 
 /// Writes `measurements` in the format that [`parse`] reads, bit for bit.
@@ -288,7 +296,8 @@ fn column(name: &str) -> Result<Column, String> {
         "_mm" => 1e-3,
         _ => return Err(format!("column `{name}` has no known unit; write q{joint}_rad, _deg, _m or _mm")),
     };
-    Ok(Column::Joint { joint: joint - 1, factor })
+    let is_length = matches!(&rest[digits..], "_m" | "_mm");
+    Ok(Column::Joint { joint: joint - 1, factor, is_length })
 }
 
 #[cfg(test)]

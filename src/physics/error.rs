@@ -30,9 +30,9 @@ pub enum PhysicsError {
         expected: usize,
     },
     /// A clearance that is negative, not finite, or so large that first-order play no longer describes it.
-    #[error("{what} clearance of joint {joint} is {got}, allowed is 0 to {largest} ({unit})")]
+    #[error("{what} clearance of joint number {} is {got}, allowed is 0 to {largest} ({unit})", .joint + 1)]
     BadClearance {
-        /// Index of the joint.
+        /// Index of the joint, from 0.
         joint: usize,
         /// Radial, axial or tilt.
         what: &'static str,

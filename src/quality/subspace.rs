@@ -93,17 +93,15 @@ impl Subspace {
         }
         independent.sort_unstable();
         let dropped: Vec<usize> = (0..columns).filter(|column| !independent.contains(column)).collect();
-        let share = if dropped.is_empty() || independent.is_empty() {
-            DMatrix::zeros(independent.len(), dropped.len())
-        } else {
-            let qr = triangle.select_columns(&independent).qr();
-            let mut right = triangle.select_columns(&dropped);
-            qr.q_tr_mul(&mut right);
-            let mut share = right.rows(0, independent.len()).into_owned();
-            qr.unpack_r().solve_upper_triangular_mut(&mut share);
-            share
-        };
+        let share = share(&triangle, &independent, &dropped);
         Subspace { independent, dropped, share, singular_values }
+    }
+
+    /// The same choice of parameters with the shares of another Jacobian, such as that at the solution.
+    #[must_use]
+    pub fn at(self, jacobian: &DMatrix<f64>) -> Subspace {
+        let share = share(jacobian, &self.independent, &self.dropped);
+        Subspace { share, ..self }
     }
 
     /// The subspace that `arm`'s structure allows, whatever is measured within its joint limits: full poses if `attitude`, else
@@ -123,6 +121,19 @@ impl Subspace {
         }
         Subspace::reveal(&stacked, &late(arm), 0.0)
     }
+}
+
+/// The amounts of the independent parameters that act like a unit of each dropped one: least squares over the poses.
+fn share(jacobian: &DMatrix<f64>, independent: &[usize], dropped: &[usize]) -> DMatrix<f64> {
+    if dropped.is_empty() || independent.is_empty() {
+        return DMatrix::zeros(independent.len(), dropped.len());
+    }
+    let qr = jacobian.select_columns(independent).qr();
+    let mut right = jacobian.select_columns(dropped);
+    qr.q_tr_mul(&mut right);
+    let mut share = right.rows(0, independent.len()).into_owned();
+    qr.unpack_r().solve_upper_triangular_mut(&mut share);
+    share
 }
 
 /// Parameters to drop before others: every β. Between axes that are not parallel β stands in for the others and is the one that

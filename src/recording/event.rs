@@ -31,6 +31,9 @@ pub struct Start {
     /// Public part of the scene, as TOML: whatever is needed to repeat the run but the truth. Empty where a real arm was measured and
     /// its URDF is all there is.
     pub scene: String,
+    /// Number of poses to be measured, where the scene alone does not tell (a design from elsewhere).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub poses: Option<usize>,
     /// The real cell, where measurements come from a table.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub real: Option<RealCell>,

@@ -247,7 +247,7 @@ impl Messages {
             footer_seen: false,
             ended: false,
             fault: None,
-            start: Start { version: String::new(), command: String::new(), scene: String::new(), real: None },
+            start: Start { version: String::new(), command: String::new(), scene: String::new(), poses: None, real: None },
         };
         messages.fill()?;
         match messages.queue.front() {

@@ -93,6 +93,7 @@ fn events(size: &Size) -> Vec<Event> {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             command: "run".to_owned(),
             scene: "name = \"synthetic\"\nseed = 11 # ünïcode, \"quotes\"\n".to_owned(),
+            poses: Some(19),
             real: Some(RealCell {
                 urdf: Some("<robot/>".to_owned()),
                 base_link: Some("base_link".to_owned()),
@@ -165,7 +166,7 @@ fn events(size: &Size) -> Vec<Event> {
         iterations: 4,
         rank: 27,
         equations: 120,
-        residual_scale: stream.uniform(0.8, 1.2),
+        residual_scale: Some(stream.uniform(0.8, 1.2)),
         parameters: parameters
             .iter()
             .enumerate()

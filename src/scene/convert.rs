@@ -385,7 +385,10 @@ fn sensor(file: &SensorToml) -> Checked<Sensor> {
             .attitude_noise_deg
             .map(|degrees| declared_noise(degrees, "sensor.attitude_noise_deg").map(f64::to_radians))
             .transpose()?,
-        temperature_sigma_k: not_negative(file.temperature_noise_k, "sensor.temperature_noise_k")?,
+        temperature_sigma_k: file
+            .temperature_noise_k
+            .map(|sigma| not_negative(sigma, "sensor.temperature_noise_k"))
+            .transpose()?,
     })
 }
 
@@ -470,7 +473,6 @@ fn plan(file: &PlanToml) -> Checked<Plan> {
 
 /// The hidden part, checked against the arm it is about.
 pub(super) fn injected(file: &InjectedToml, arm: &Arm) -> Checked<Injected> {
-    seed(file.seed, "injected.seed")?;
     let parameters = &file.parameters;
     let mut parameter_errors = Vec::with_capacity(parameters.errors.len());
     for (key, value) in &parameters.errors {
@@ -499,7 +501,7 @@ pub(super) fn injected(file: &InjectedToml, arm: &Arm) -> Checked<Injected> {
     }
     let thermal = file.thermal.as_ref().map(|thermal| self::thermal(thermal, arm)).transpose()?;
     Ok(Injected {
-        seed: file.seed,
+        seed: file.seed.clone(),
         length_error_m: metres_from_mm(not_negative(parameters.length_mm, "injected.parameters.length_mm")?),
         angle_error_rad: not_negative(parameters.angle_deg, "injected.parameters.angle_deg")?.to_radians(),
         parameter_errors,

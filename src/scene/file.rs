@@ -269,9 +269,9 @@ pub struct SensorToml {
     /// Attitude noise per axis, degrees. Absent: the sensor sees positions only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub attitude_noise_deg: Option<f64>,
-    /// Noise of the temperature sensors on the links, K. Default: 0.
-    #[serde(default)]
-    pub temperature_noise_k: f64,
+    /// Noise of the temperature sensors on the moving links, K. Absent: there are none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature_noise_k: Option<f64>,
 }
 
 /// `[design]`: how many configurations are measured and how they are chosen.
@@ -389,6 +389,20 @@ fn seconds_per_pose() -> f64 {
     10.0
 }
 
+/// A text, or a whole number as its digits.
+fn text_or_number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "a text or a whole number")]
+    enum Key {
+        Text(String),
+        Number(i64),
+    }
+    Ok(match Key::deserialize(deserializer)? {
+        Key::Text(text) => text,
+        Key::Number(number) => number.to_string(),
+    })
+}
+
 fn reference_temperature_c() -> f64 {
     20.0
 }
@@ -397,8 +411,10 @@ fn reference_temperature_c() -> f64 {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InjectedToml {
-    /// Seed of everything that is drawn for the truth, combined with the scene's; 0 … 2⁶³−1.
-    pub seed: u64,
+    /// Key of everything that is drawn for the truth, combined with the scene's public seed: any text or whole number. Whoever
+    /// guesses it can draw the truth from a recording; 32 random hexadecimal digits cannot be guessed.
+    #[serde(deserialize_with = "text_or_number")]
+    pub seed: String,
     /// `[injected.parameters]`; absent: none is wrong.
     #[serde(default)]
     pub parameters: ParametersToml,

@@ -114,8 +114,8 @@ pub enum Weights {
 /// What is injected: the hidden part of a scene, with its own seed. Only the simulated measurement sees it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Injected {
-    /// Seed of everything that is drawn for the truth; combined with the scene's seed.
-    pub seed: u64,
+    /// Key of everything that is drawn for the truth; combined with the scene's seed.
+    pub seed: String,
     /// Half width of the uniform errors of length parameters, m.
     pub length_error_m: f64,
     /// Half width of the uniform errors of angle parameters, rad.

@@ -138,14 +138,14 @@ impl SceneFile {
     /// Overrides the hidden seed.
     ///
     /// # Errors
-    /// If the scene injects nothing, or the seed exceeds 2⁶³−1.
-    pub fn set_injected_seed(&mut self, seed: u64) -> Result<(), SceneError> {
+    /// If the scene injects nothing.
+    pub fn set_injected_seed(&mut self, seed: &str) -> Result<(), SceneError> {
         if self.injected.is_none() {
-            return Err(nothing_injected().at(&origin_of("injected.seed", &seed.to_string()), None));
+            return Err(nothing_injected().at(&origin_of("injected.seed", seed), None));
         }
         self.change("injected.seed", &seed, |toml| {
             if let Some(injected) = &mut toml.injected {
-                injected.seed = seed;
+                injected.seed = seed.to_owned();
             }
         })
     }

@@ -82,7 +82,7 @@ impl Summary {
     /// `scales` states how long the arrows of the residuals are drawn.
     pub(super) fn identified(&mut self, identified: &Identification, scales: &[String]) {
         let mut text = format!(
-            "#### Identified\n{}**{}** after {} iterations: {}. Rank {} of {} parameters, {} equations, residual scale {}.\n\n",
+            "#### Identified\n{}**{}** after {} iterations: {}. Rank {} of {} parameters, {} equations{}.\n\n",
             table(identified),
             if identified.converged { "converged" } else { "NOT CONVERGED" },
             identified.iterations,
@@ -90,7 +90,10 @@ impl Summary {
             identified.rank,
             identified.parameters.len(),
             identified.equations,
-            significant(identified.residual_scale, 4),
+            identified
+                .residual_scale
+                .map(|scale| format!(", residuals {} × declared noise", significant(scale, 3)))
+                .unwrap_or_default(),
         );
         if !scales.is_empty() {
             for scale in scales {

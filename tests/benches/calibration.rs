@@ -87,7 +87,7 @@ fn measurements(file: &SceneFile, count: usize) -> Vec<Measurement> {
     let chosen = sampler.draw(&mut stream(1, "bench/poses"), count).expect("free configurations");
     let planned = plan(&file.scene, &split(&chosen, 8), &[]);
     let injected = file.injected.as_ref().expect("a scene to simulate");
-    measure(&file.scene, injected, &planned, &mut Nobody).expect("measurements").0
+    measure(&file.scene, injected, &planned, planned.len(), &mut Nobody).expect("measurements").0
 }
 
 struct Nobody;
