@@ -79,7 +79,7 @@ pub(crate) fn print(text: &str) -> anyhow::Result<()> {
 /// Refuses a target for `--rerun` that cannot be, whether or not the command shows anything.
 pub(crate) fn check_rerun(global: &Global) -> anyhow::Result<()> {
     #[cfg(feature = "viewer")]
-    let _: crate::viewing::Target = global.rerun.parse()?;
+    let _: crate::viewing::Target = global.rerun.parse().with_context(|| format!("--rerun {}", global.rerun))?;
     #[cfg(not(feature = "viewer"))]
     if !["auto", "off"].contains(&global.rerun.as_str()) {
         bail!("--rerun {}: this kincal was built without the viewer; build it with the default features", global.rerun);

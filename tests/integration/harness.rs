@@ -23,6 +23,10 @@ pub(crate) struct Ran {
 pub(crate) fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_kincal"));
     command.args(arguments).current_dir(env!("CARGO_MANIFEST_DIR")).stdin(Stdio::null());
+    // A viewer that happens to listen on this machine is left alone.
+    if !arguments.contains(&"--rerun") {
+        command.args(["--rerun", "off"]);
+    }
     command
 }
 
