@@ -158,9 +158,7 @@ impl<'a> SimulatedSensor<'a> {
         };
         // The base link has no sensor. Whether there are others is public: nothing is told by their absence.
         let temperatures = match self.declared.temperature_sigma_k {
-            Some(sigma_k) => {
-                rise_k.iter().skip(1).map(|rise| reference_c + rise + sigma_k * self.temperature.normal()).collect()
-            }
+            Some(sigma_k) => rise_k.iter().skip(1).map(|rise| reference_c + rise + sigma_k * self.temperature.normal()).collect(),
             None => Vec::new(),
         };
         if exact {

@@ -172,11 +172,7 @@ fn recorded(global: &Global, path: &Path, partial: bool) -> anyhow::Result<(Star
 }
 
 /// Adds the measurements of `--evaluate` as held-out ones.
-fn with_evaluation(
-    mut measurements: Vec<Measurement>,
-    options: &IdentifyOptions,
-    arm: &Arm,
-) -> anyhow::Result<Vec<Measurement>> {
+fn with_evaluation(mut measurements: Vec<Measurement>, options: &IdentifyOptions, arm: &Arm) -> anyhow::Result<Vec<Measurement>> {
     let Some(other) = &options.evaluate else {
         return Ok(measurements);
     };

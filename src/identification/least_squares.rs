@@ -23,6 +23,8 @@ const ROUNDING: f64 = 1e-12;
 const PLAUSIBLE_ERROR: f64 = 0.03;
 /// The residuals may make the noise look so many times as large as declared when it is told what drowns in it.
 const LARGEST_NOISE_FACTOR: f64 = 10.0;
+/// Residuals (RMS, m or rad) that no calibrated arm leaves, if the noise does not explain them.
+const ASTRAY: f64 = 0.02;
 /// Residuals so many times the declared noise make one doubt that it is this robot.
 const FOREIGN_ROBOT: f64 = 200.0;
 /// Below this probability of the residuals under the declared noise, the noise is taken to be larger than declared.
@@ -145,8 +147,9 @@ pub fn identify(
     let inflated = tested && p_value < DECLARED_NOISE_REJECTED;
     if inflated {
         notes.push(format!(
-            "residuals are {scale:.2} times what the declared noise allows (chi-square p = {p_value:.1e}): something is not \
-             modelled; standard errors are scaled by {scale:.2}, and cannot show a bias"
+            "residuals are {scale:.2} times what the declared noise allows (chi-square p {}): something is not \
+             modelled; standard errors are scaled by {scale:.2}, and cannot show a bias",
+            if p_value < 1e-300 { "below 1e-300".to_owned() } else { format!("= {p_value:.1e}") }
         ));
     }
     if noise.known && scale > FOREIGN_ROBOT {
@@ -213,9 +216,20 @@ pub fn identify(
             identified: residual(measurement, &at_identified).into(),
         })
         .collect();
+    let fitted = errors(&fit, &at_identified);
+    // Least squares also comes to rest in places that have nothing to do with the arm.
+    let far = fitted.position_m.rms > ASTRAY || fitted.rotation_rad.is_some_and(|rotation| rotation.rms > ASTRAY);
+    let astray = noise.known && scale > LARGEST_NOISE_FACTOR && far;
+    let reason = if rank == 0 {
+        "these configurations tell nothing apart".to_owned()
+    } else if solution.converged && astray {
+        format!("the fit came to rest where {:.0} mm RMS are left: this is no calibration", fitted.position_m.rms * 1e3)
+    } else {
+        solution.reason
+    };
     Ok(Identification {
-        converged: solution.converged && rank > 0,
-        reason: if rank > 0 { solution.reason } else { "these configurations tell nothing apart".to_owned() },
+        converged: solution.converged && rank > 0 && !astray,
+        reason,
         iterations: solution.steps,
         rank,
         equations,
@@ -223,7 +237,7 @@ pub fn identify(
         parameters,
         combinations,
         nominal: errors(&fit, &at_nominal),
-        fitted: errors(&fit, &at_identified),
+        fitted,
         held_out: (!held_out.is_empty()).then(|| errors(&held_out, &at_identified)),
         held_out_nominal: (!held_out.is_empty()).then(|| errors(&held_out, &at_nominal)),
         residuals,
@@ -449,7 +463,9 @@ fn gram(matrix: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// `left · right`; see [`gram`].
 fn product(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
-    DMatrix::from_fn(left.nrows(), right.ncols(), |row, column| left.row(row).iter().zip(right.column(column).iter()).map(|(a, b)| a * b).sum())
+    DMatrix::from_fn(left.nrows(), right.ncols(), |row, column| {
+        left.row(row).iter().zip(right.column(column).iter()).map(|(a, b)| a * b).sum()
+    })
 }
 
 /// Inverse of a positive definite matrix whose rows have different units.

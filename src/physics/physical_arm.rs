@@ -141,8 +141,12 @@ mod tests {
             let joints = test_arms::configuration(&arm, &mut stream);
             let growth = test_arms::growth(&arm, &mut stream);
             let at = arm.chain.at(&parameters);
-            let mut expected = Pose::identity();
+            // Where the arm stands does not grow, so that the foot begins at the base link.
+            let standing = arm.chain.frame_names().iter().position(|frame| *frame == arm.links[0].name).unwrap();
+            let base_from_foot = at.frames(&joints)[standing];
+            let mut expected = base_from_foot;
             for (index, segment) in at.segments().iter().enumerate() {
+                let segment = if index == 0 { base_from_foot.inverse() * segment } else { *segment };
                 expected *= Pose::from_parts(Translation3::from(segment.translation.vector * growth[index]), segment.rotation);
                 if let Some(q) = joints.get(index) {
                     expected *= match kinds[index] {
@@ -468,7 +472,7 @@ mod tests {
         let error = new(&arm, &[Clearance::NONE; 7], Settling::default());
         assert_eq!(error.to_string(), "7 clearances, expected 8");
         let error = new(&arm, &[Clearance { radial_m: -1e-6, ..Clearance::NONE }; 8], Settling::default());
-        assert_eq!(error.to_string(), "radial clearance of joint 0 is -0.000001, allowed is 0 to 0.001 (m)");
+        assert_eq!(error.to_string(), "radial clearance of joint number 1 is -0.000001, allowed is 0 to 0.001 (m)");
         let error = new(&arm, &[Clearance::NONE; 8], Settling { tolerance_m: f64::NAN, ..Settling::default() });
         assert!(matches!(error, PhysicsError::BadSetting { what: "tolerance_m", .. }));
         let mut heavy = arm.clone();

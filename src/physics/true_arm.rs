@@ -93,9 +93,8 @@ impl TrueArm {
 
     /// Segment `index` when the link it is on has grown by the factor `growth[index]`.
     pub(super) fn grown_segment(&self, index: usize, growth: &[f64]) -> Pose {
-        let grown = |segment: &Pose| {
-            Pose::from_parts(Translation3::from(segment.translation.vector * growth[index]), segment.rotation)
-        };
+        let grown =
+            |segment: &Pose| Pose::from_parts(Translation3::from(segment.translation.vector * growth[index]), segment.rotation);
         if index == 0 {
             // Where the arm stands in the cell is no link: only the foot grows.
             return self.base_from_base_link * grown(&(self.base_from_base_link.inverse() * self.segments[0]));

@@ -141,7 +141,7 @@ pub fn identification(identification: &Identification) -> String {
         identification.residual_scale.map(|scale| format!("; residuals {scale:.2} × declared noise")).unwrap_or_default(),
     ));
     for note in &identification.notes {
-        text.push_str(&format!("Note: {note}.\n"));
+        text.push_str(&format!("Note: {note}{}\n", if note.ends_with('?') { "" } else { "." }));
     }
     text
 }

@@ -183,7 +183,19 @@ fn the_public_part_parses_back_to_the_same_scene_and_hides_the_rest() {
         assert_eq!(back.public_toml().expect("it can be written"), public);
         let (_, hidden) = text.split_once("[injected]").expect("the scenes inject");
         assert!(hidden.contains("seed = \""));
-        for word in ["injected", "5a09f3c1", "c83e17b0", "error", "length_mm", "angle_deg", "clearance", "play", "thermal", "expansion", "#"] {
+        for word in [
+            "injected",
+            "5a09f3c1",
+            "c83e17b0",
+            "error",
+            "length_mm",
+            "angle_deg",
+            "clearance",
+            "play",
+            "thermal",
+            "expansion",
+            "#",
+        ] {
             assert!(!public.contains(word), "{word:?} is in the public text");
         }
         let injected = file.injected_toml().expect("it can be written").expect("the scenes inject");

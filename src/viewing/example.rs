@@ -99,8 +99,13 @@ fn events(particles: usize, count: usize, iterations: usize, held_out: usize) ->
     let nominal = arm.chain.at_nominal();
     let mut draw = stream(1, "test/viewing");
     let mut configuration = |spread: f64| (0..JOINTS).map(|_| draw.uniform(-spread, spread)).collect::<Vec<f64>>();
-    let start =
-        Start { version: "0.1.0".to_owned(), command: "run".to_owned(), scene: "name = \"example\"\n".to_owned(), poses: None, real: None };
+    let start = Start {
+        version: "0.1.0".to_owned(),
+        command: "run".to_owned(),
+        scene: "name = \"example\"\n".to_owned(),
+        poses: None,
+        real: None,
+    };
     let mut events = vec![Event::Start(start), Event::Note("design by particle swarm, seed 1".to_owned())];
 
     let goal: Vec<Vec<f64>> = (0..count).map(|_| configuration(1.5)).collect();

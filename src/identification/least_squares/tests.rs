@@ -68,32 +68,63 @@ fn exact_poses_of_any_true_arm_are_predicted_exactly_whatever_was_dropped() {
     }
 }
 
-/// A small version of the coverage check: 95 % intervals must hold the truth 95 times in 100.
+/// A small version of the coverage check: 95 % intervals must hold the truth 95 times in 100, however large the errors are. The
+/// truth of a combination is what its parameter becomes when the exact poses of the true arm are fitted with the same parameters
+/// held at nominal.
 #[test]
 fn intervals_cover_the_true_combinations() {
-    let arm = scene("arm8.toml").scene.arm;
-    let subspace = Subspace::of_structure(&arm, true);
-    let (mut inside, mut total) = (0, 0);
-    for trial in 0..60 {
-        let mut stream = stream(trial, "test/coverage");
-        let values = true_values(&arm, 1e-3, 0.2f64.to_radians(), &mut stream);
-        let sigma = [20e-6, 5e-5];
-        let measured = measure(&arm, &values, 60, sigma, true, &mut stream);
-        let result = identify(&arm, &sensor(sigma, true), Weights::Noise, &measured).unwrap();
-        assert!(result.converged);
-        for (position, combination) in result.combinations.iter().enumerate() {
-            let column = subspace.independent[position];
-            let mut truth = values[column] - arm.chain.parameters[column].nominal;
-            for (other, &dropped) in subspace.dropped.iter().enumerate() {
-                truth += subspace.share[(position, other)] * (values[dropped] - arm.chain.parameters[dropped].nominal);
+    for (name, length, angle_deg, sigma) in [("arm8.toml", 1e-3, 0.2f64, [20e-6, 5e-5]), ("paper.toml", 0.03, 1.72, [1e-3, 1e-3])]
+    {
+        let arm = scene(name).scene.arm;
+        let (mut inside, mut total) = (0, 0);
+        for trial in 0..40 {
+            let mut stream = stream(trial, "test/coverage");
+            let values = true_values(&arm, length, angle_deg.to_radians(), &mut stream);
+            let exact = measure(&arm, &values, 60, [0.0, 0.0], true, &mut stream);
+            let mut noisy = exact.clone();
+            for row in &mut noisy {
+                let q = rotation_from_vector(&Vector3::from_fn(|_, _| sigma[1] * stream.normal())) * row.attitude().unwrap();
+                row.attitude_xyzw = Some([q.i, q.j, q.k, q.w]);
+                row.position_m.iter_mut().for_each(|value| *value += sigma[0] * stream.normal());
             }
-            // The share is of first order: the true errors are small enough that the second is far below a standard error.
-            inside += usize::from((combination.interval95[0]..=combination.interval95[1]).contains(&truth));
-            total += 1;
+            let sensor = sensor(sigma, true);
+            let truth = identify(&arm, &sensor, Weights::Noise, &exact).unwrap();
+            let result = identify(&arm, &sensor, Weights::Noise, &noisy).unwrap();
+            assert!(result.converged && truth.converged);
+            for (combination, truth) in result.combinations.iter().zip(&truth.combinations) {
+                assert_eq!(combination.name, truth.name);
+                inside += u32::from((combination.interval95[0]..=combination.interval95[1]).contains(&truth.estimate));
+                total += 1;
+            }
         }
+        let coverage = f64::from(inside) / f64::from(total);
+        assert!((0.93..=0.97).contains(&coverage), "{name}: {coverage:.3} of {total}");
     }
-    let coverage = f64::from(inside as u32) / f64::from(total as u32);
-    assert!((0.93..=0.97).contains(&coverage), "{coverage:.3} of {total}");
+}
+
+/// To first order the combination is the expression that is printed.
+#[test]
+fn an_expression_is_what_the_independent_parameter_takes_up() {
+    let arm = scene("arm8.toml").scene.arm;
+    let mut stream = stream(9, "test/expression");
+    let values = true_values(&arm, 1e-5, 1e-5, &mut stream);
+    let exact = measure(&arm, &values, 60, [0.0, 0.0], true, &mut stream);
+    let result = identify(&arm, &sensor([1e-6, 1e-6], true), Weights::Noise, &exact).unwrap();
+    let subspace = Subspace::of_structure(&arm, true);
+    for (position, combination) in result.combinations.iter().enumerate() {
+        let change = |column: usize| values[column] - arm.chain.parameters[column].nominal;
+        let column = subspace.independent[position];
+        assert_eq!(combination.name, arm.chain.parameters[column].name);
+        let shared =
+            subspace.dropped.iter().enumerate().map(|(other, dropped)| subspace.share[(position, other)] * change(*dropped));
+        let expected = change(column) + shared.sum::<f64>();
+        assert!(
+            (combination.estimate - expected).abs() < 2e-9,
+            "{}: {} is not {expected}",
+            combination.expression,
+            combination.estimate
+        );
+    }
 }
 
 #[test]
