@@ -19,7 +19,7 @@ pub struct Arm {
     pub fixtures: Vec<Fixture>,
     /// Pairs of links (by index, smaller first) that are never checked against each other, besides neighbours.
     pub uncollidable: Vec<(usize, usize)>,
-    /// Acceleration of free fall in base, m/s².
+    /// Acceleration of free fall in the chain's first frame, m/s².
     pub gravity_in_base: Vector3<f64>,
 }
 

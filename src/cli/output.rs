@@ -144,7 +144,11 @@ impl Audience {
         let recording = self.recorder.take().map(Recorder::finish).transpose()?;
         #[cfg(feature = "viewer")]
         if let Some(viewer) = self.viewer.take() {
-            viewer.finish()?;
+            match viewer.finish() {
+                // Nobody watches any more: no reason to call the run a failure.
+                Err(error @ crate::viewing::ViewerError::Lost { .. }) => eprintln!("note: {error}"),
+                other => other?,
+            }
         }
         Ok(recording)
     }

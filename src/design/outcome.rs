@@ -72,7 +72,7 @@ pub struct DesignOutcome {
     pub indexes: Indexes,
     /// The same with all singular values counted, those that are zero up to rounding too: the plain reading of eqs. 15–17.
     pub indexes_all_parameters: Indexes,
-    /// Evenness in the other workspace domain, for comparison.
+    /// Evenness in both workspace domains.
     pub evenness_domains: EvennessDomains,
     /// Random sets of the same size.
     pub random: RandomReference,

@@ -132,8 +132,8 @@ pub fn identify(
     if rank < structural {
         notes.push(format!(
             "of the {structural} combinations that this arm's structure allows, these configurations show {rank}: the rest would be \
-             uncertain by more than {:.0} mm or mrad and is held at nominal; measure more different configurations, or a target \
-             further from the last axis",
+             uncertain by more than {:.0} mm or mrad and is held at nominal, and what it is off by is in no standard error; measure \
+             more different configurations, or a target further from the last axis",
             PLAUSIBLE_ERROR * 1e3
         ));
     }

@@ -342,7 +342,8 @@ fn samples() {
     write(&folder.join("half-swarm.rrd"), &arm, &run[..18]);
     write(&folder.join("half-measured.rrd"), &arm, &run[..64]);
     let part = |command: &str, keep: fn(&Event) -> bool| -> Vec<Event> {
-        let start = Start { version: "0.1.0".to_owned(), command: command.to_owned(), scene: String::new() };
+        let start =
+            Start { version: "0.1.0".to_owned(), command: command.to_owned(), scene: String::new(), poses: None, real: None };
         std::iter::once(Event::Start(start)).chain(run[1..].iter().filter(|event| keep(event)).cloned()).collect()
     };
     write(&folder.join("design.rrd"), &arm, &part("design", |e| matches!(e, Event::Swarm(_) | Event::Designed(_))));

@@ -161,8 +161,11 @@ pub fn open(target: &Target, arm: &Arm, name: &str) -> Result<Option<Viewer>, Vi
             (Destination::Stream(url), Box::new(GrpcSink::new(uri)))
         }
         Target::File(path) => {
-            let sink =
-                FileSink::new(path).map_err(|error| ViewerError::Create { path: path.clone(), reason: innermost(&error) })?;
+            let create = |reason: String| ViewerError::Create { path: path.clone(), reason };
+            if let Some(folder) = path.parent() {
+                std::fs::create_dir_all(folder).map_err(|error| create(error.to_string()))?;
+            }
+            let sink = FileSink::new(path).map_err(|error| create(innermost(&error)))?;
             (Destination::File(path.clone()), Box::new(sink))
         }
     };
