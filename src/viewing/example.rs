@@ -276,9 +276,9 @@ fn a_run_is_written_to_a_file() {
 
 #[test]
 fn a_file_that_cannot_be_written_is_an_error_with_its_name() {
-    let error = open(&Target::File(PathBuf::from("/no/such/folder/run.rrd")), &arm(), "example").unwrap_err();
+    let error = open(&Target::File(PathBuf::from("/proc/no/folder/run.rrd")), &arm(), "example").unwrap_err();
     assert!(matches!(&error, ViewerError::Create { .. }), "{error:?}");
-    assert_eq!(error.to_string(), "/no/such/folder/run.rrd cannot be written: No such file or directory (os error 2)");
+    assert_eq!(error.to_string(), "/proc/no/folder/run.rrd cannot be written: No such file or directory (os error 2)");
 }
 
 #[test]
