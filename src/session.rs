@@ -88,6 +88,12 @@ pub fn start_event(command: &str, scene_toml: &str) -> Start {
     }
 }
 
+/// The result, then its notes one by one.
+fn tell(identification: &Identification, listener: &mut dyn Listener) -> Result<(), ListenerError> {
+    listener.take(&Event::Identified(identification.clone()))?;
+    identification.notes.iter().try_for_each(|note| listener.take(&Event::Note(note.clone())))
+}
+
 /// A real arm in the frame in which it was measured, and its sensor.
 #[derive(Clone, Debug)]
 pub struct RealArm {
@@ -144,7 +150,7 @@ pub fn identify_real(
     let frames = "nominal means: the measurement frame and the target fitted, the robot as its file says";
     identification.notes.push(frames.to_owned());
     identification.notes.extend(real.notes.iter().cloned());
-    listener.take(&Event::Identified(identification.clone()))?;
+    tell(&identification, listener)?;
     Ok(identification)
 }
 
@@ -172,7 +178,7 @@ pub fn identify_and_tell(
     listener: &mut dyn Listener,
 ) -> Result<Identification, SessionError> {
     let identification = identify(&scene.arm, &scene.sensor, scene.weights, measurements)?;
-    listener.take(&Event::Identified(identification.clone()))?;
+    tell(&identification, listener)?;
     Ok(identification)
 }
 
@@ -242,7 +248,8 @@ pub fn replay(
                     Subject::Real(real) => identify_real(real, measured, listener)?,
                 };
             }
-            Event::Note(_) => listener.take(event)?,
+            // Told again by the step that they are about.
+            Event::Note(_) => {}
         }
     }
     Ok(truth)

@@ -32,13 +32,13 @@ pub(crate) struct Global {
     /// Print one JSON object on stdout; everything else goes to stderr
     #[arg(long, global = true)]
     pub(crate) json: bool,
-    /// Seed in place of the scene's
+    /// Seed in place of the scene's; file names then end in -seedN
     #[arg(long, global = true, value_name = "N")]
     pub(crate) seed: Option<u64>,
     /// Number of threads (the result does not depend on it)
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
-    /// No progress bars, no notes
+    /// No progress bars and no remarks on stderr
     #[arg(long, short, global = true)]
     pub(crate) quiet: bool,
     /// Folder for what is written

@@ -122,10 +122,7 @@ fn conclude(
     recording: Option<&Path>,
     stem: &str,
 ) -> anyhow::Result<Outcome> {
-    let values: Vec<f64> = identification.parameters.iter().map(|parameter| parameter.identified).collect();
-    let path = global.out.join(format!("{stem}.urdf"));
-    let text = urdf::export_with(arm, &values)?;
-    output::write(&path, &text)?;
+    let path = output::write_calibrated(global.out.join(format!("{stem}.urdf")), arm, identification)?;
     output::show(global, &report::identification(identification))?;
     if options.parameters {
         output::show(global, &report::combinations(identification))?;
@@ -133,7 +130,7 @@ fn conclude(
     if let Some(recording) = recording {
         output::show(global, &format!("Recording   {}", recording.display()))?;
     }
-    output::show(global, &format!("Calibrated  {}", path.display()))?;
+    output::show(global, &format!("Calibrated  {}", output::written(path.as_deref())))?;
     let mut object = serde_json::to_value(identification)?;
     if let Value::Object(map) = &mut object {
         map.insert("recording".to_owned(), serde_json::to_value(recording)?);

@@ -22,6 +22,14 @@ pub(crate) fn command(global: &Global, options: &MeasureOptions) -> anyhow::Resu
             _ => None,
         })
         .with_context(|| format!("{} holds no design; make one with `kincal design`", options.design.display()))?;
+    let designed_for = crate::scene::parse(&designed.start.scene, &options.design.display().to_string())?;
+    ensure!(
+        designed_for.scene.arm.chain == scene.arm.chain,
+        "{} was designed for the arm of scene `{}`, whose kinematics differ from {}'s: design for this scene",
+        options.design.display(),
+        designed_for.scene.name,
+        options.scene.scene.display()
+    );
     for (index, joints) in outcome.configurations.iter().enumerate() {
         ensure!(
             joints.len() == scene.arm.joint_count() && scene.arm.within_limits(joints),
@@ -36,6 +44,7 @@ pub(crate) fn command(global: &Global, options: &MeasureOptions) -> anyhow::Resu
 
     let stem = output::stem(global, &file, "-measure");
     let truth_path = global.out.join(format!("{stem}.truth.toml"));
+    output::check_key(global, injected);
     cell::measure::check(scene, injected).with_context(|| options.scene.scene.display().to_string())?;
     output::check_target(&truth_path)?;
     let mut audience = Audience::open(global, &scene.arm, Some(&stem), &stem)?;

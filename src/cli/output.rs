@@ -45,6 +45,17 @@ pub(crate) fn injected<'a>(file: &'a SceneFile, path: &Path) -> anyhow::Result<&
     })
 }
 
+/// Says so where the hidden key can be guessed.
+pub(crate) fn check_key(global: &Global, injected: &Injected) {
+    if injected.seed.len() < 16 {
+        note(
+            global,
+            "note: injected.seed is short: whoever tries all such keys can draw the truth from the recording; `openssl rand -hex 16` \
+             makes one that cannot be guessed",
+        );
+    }
+}
+
 /// Stem of a run's files: the scene's name, with the seed where the command line changed it.
 pub(crate) fn stem(global: &Global, file: &SceneFile, suffix: &str) -> String {
     let seed = global.seed.map(|seed| format!("-seed{seed}")).unwrap_or_default();
@@ -101,9 +112,38 @@ pub(crate) fn write(path: &Path, text: &str) -> anyhow::Result<()> {
         .with_context(|| format!("cannot write {}; choose another folder with --out", path.display()))
 }
 
-/// How well an identification ended. One that converged on nothing tells nothing.
+/// Writes the calibrated arm to `path` as URDF; the path, and `None` where the fit did not converge: an arm that is none must not be
+/// found there, not even that of an earlier run.
+pub(crate) fn write_calibrated(path: PathBuf, arm: &Arm, identification: &Identification) -> anyhow::Result<Option<PathBuf>> {
+    if !identification.converged {
+        if path.exists() {
+            std::fs::remove_file(&path).with_context(|| format!("cannot remove {}", path.display()))?;
+        }
+        return Ok(None);
+    }
+    let values: Vec<f64> = identification.parameters.iter().map(|parameter| parameter.identified).collect();
+    write(&path, &crate::kinematics::urdf::export_with(arm, &values)?)?;
+    Ok(Some(path))
+}
+
+/// What to print of a path that may not have been written.
+pub(crate) fn written(path: Option<&Path>) -> String {
+    path.map_or_else(|| "not written: the fit did not converge".to_owned(), |path| path.display().to_string())
+}
+
+/// Held-out errors so many times the fitted ones are no calibration of what was held out.
+const HELD_OUT_FROM_ELSEWHERE: f64 = 10.0;
+
+/// How well an identification ended. One that converged on nothing, or predicts worse than the nominal model, is no good answer.
 pub(crate) fn judged(identification: &Identification) -> Outcome {
-    if identification.converged && identification.rank > 0 { Outcome::Good } else { Outcome::Bad }
+    let worse = match (&identification.held_out, &identification.held_out_nominal) {
+        (Some(after), Some(before)) => {
+            let expected = identification.fitted.position_m.rms.max(identification.declared_noise.position_m);
+            after.position_m.rms > before.position_m.rms || after.position_m.rms > HELD_OUT_FROM_ELSEWHERE * expected
+        }
+        _ => false,
+    };
+    if identification.converged && identification.rank > 0 && !worse { Outcome::Good } else { Outcome::Bad }
 }
 
 /// Everyone who listens to a run: the recording, the viewer, the progress bar.

@@ -6,6 +6,7 @@ use serde_json::json;
 use super::Outcome;
 use super::arguments::{Global, ReplayOptions};
 use super::output::{self, Audience};
+use crate::cell::Truth;
 use crate::recording::compare::Comparer;
 use crate::recording::event::{Event, Listener, ListenerError};
 use crate::recording::truth_file::TruthFile;
@@ -83,7 +84,13 @@ pub(crate) fn command(global: &Global, options: &ReplayOptions) -> anyhow::Resul
     let text = match &comparison.first_difference {
         None if cut => format!("identical up to where the recording breaks off: {} messages; {physics}", comparison.compared),
         None if truth_equal => format!("identical: {} messages compared bit for bit; {physics}", comparison.compared),
-        None => "the recording is identical, but the truth file's parameters or poses differ from the physics".to_owned(),
+        None => format!(
+            "the recording is identical, but the truth file differs from the physics: {}",
+            match (&truth, &new_truth) {
+                (Some((_, recorded)), Some(new)) => truth_difference(recorded, new),
+                _ => String::new(),
+            }
+        ),
         Some(difference) => format!("different: {difference}"),
     };
     output::show(global, &text)?;
@@ -101,6 +108,19 @@ pub(crate) fn command(global: &Global, options: &ReplayOptions) -> anyhow::Resul
         anyhow::bail!("{cut}; only what is there was compared");
     }
     Ok(if identical { Outcome::Good } else { Outcome::Bad })
+}
+
+/// The first parameter or pose in which two truths differ.
+fn truth_difference(recorded: &Truth, recomputed: &Truth) -> String {
+    let parameters = recorded.parameters.iter().zip(&recomputed.parameters);
+    if let Some((recorded, new)) = parameters.into_iter().find(|(recorded, new)| recorded != new) {
+        return format!("{} is {:?} there, {:?} recomputed", recorded.name, recorded.true_value, new.true_value);
+    }
+    let poses = recorded.poses.iter().zip(&recomputed.poses);
+    match poses.into_iter().find(|(recorded, new)| recorded != new) {
+        Some((pose, _)) => format!("pose {}", pose.index),
+        None => format!("{} poses there, {} recomputed", recorded.poses.len(), recomputed.poses.len()),
+    }
 }
 
 struct Replayer {

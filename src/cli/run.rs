@@ -18,6 +18,7 @@ pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result
     let urdf_text = urdf::export(&scene.arm)?;
     let [truth_path, urdf_path, calibrated_path] =
         ["truth.toml", "urdf", "calibrated.urdf"].map(|extension| global.out.join(format!("{stem}.{extension}")));
+    output::check_key(global, injected);
     cell::measure::check(scene, injected).with_context(|| options.scene.display().to_string())?;
     [&truth_path, &urdf_path, &calibrated_path].into_iter().try_for_each(|path| output::check_target(path))?;
 
@@ -28,8 +29,7 @@ pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result
     let recording = audience.finish()?;
 
     output::write(&urdf_path, &urdf_text)?;
-    let calibrated: Vec<f64> = run.identification.parameters.iter().map(|parameter| parameter.identified).collect();
-    output::write(&calibrated_path, &urdf::export_with(&scene.arm, &calibrated)?)?;
+    let calibrated_path = output::write_calibrated(calibrated_path, &scene.arm, &run.identification)?;
 
     let parameter_count = scene.arm.chain.parameters.len();
     output::show(global, &format!("{}: {}\n{}\n", scene.name, scene.description, scene.arm_note))?;
@@ -44,7 +44,7 @@ pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result
                 recording.display(),
                 truth_path.display(),
                 urdf_path.display(),
-                calibrated_path.display()
+                output::written(calibrated_path.as_deref())
             ),
         )?;
     }

@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3, Vector6};
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
-use super::outcome::{Combination, Errors, Identification, ParameterEstimate, Residual, Summary};
+use super::outcome::{Combination, DeclaredNoise, Errors, Identification, ParameterEstimate, Residual, Summary};
 use crate::arm::Arm;
 use crate::frames::{Pose, pose_error};
 use crate::kinematics::ChainAt;
@@ -23,6 +23,12 @@ const ROUNDING: f64 = 1e-12;
 const PLAUSIBLE_ERROR: f64 = 0.03;
 /// The residuals may make the noise look so many times as large as declared when it is told what drowns in it.
 const LARGEST_NOISE_FACTOR: f64 = 10.0;
+/// Held-out errors so many times the fitted ones come from another cell.
+const STRANGE: f64 = 10.0;
+/// A change (m or rad) that no real arm needs.
+const ABSURD_CHANGE: f64 = 0.06;
+/// A residual so many times the median is a wild reading.
+const WILD: f64 = 8.0;
 /// Residuals (RMS, m or rad) that no calibrated arm leaves, if the noise does not explain them.
 const ASTRAY: f64 = 0.02;
 /// Residuals so many times the declared noise make one doubt that it is this robot.
@@ -101,28 +107,30 @@ pub fn identify(
     let nominal = arm.chain.nominal();
 
     let equations = problem.equations();
-    let structural = Subspace::of_structure(arm, problem.rows_per_pose == 6).rank();
+    let structure = Subspace::of_structure(arm, problem.rows_per_pose == 6);
+    let structural = structure.rank();
     if equations < structural {
         let needed = structural.div_ceil(problem.rows_per_pose);
         return Err(IdentificationError::TooFew { poses: fit.len(), equations, rank: structural, needed });
     }
 
-    // How large the noise really is shows only in the residuals, and with it which combinations drown in it. Up to a limit: what
-    // is far beyond the noise is the wrong robot, not noise.
-    let mut assumed: f64 = 1.0;
-    let (subspace, solution, noise, scale) = loop {
+    // How large the noise really is shows only in the residuals, and with it which combinations drown in it: the fit is made again
+    // without the weakest until none does. What is far beyond the noise is the wrong robot, not noise.
+    let mut limit = usize::MAX;
+    let (subspace, solution, noise, scale, covariance) = loop {
         let start = problem.linearise(&nominal);
-        let subspace = Subspace::reveal(&problem.in_sigmas(&start.jacobian), &late(arm), assumed / PLAUSIBLE_ERROR);
+        let subspace = Subspace::reveal(&problem.in_sigmas(&start.jacobian), &late(arm), 1.0 / PLAUSIBLE_ERROR, limit);
         let solution = solve(&problem, &subspace.independent, nominal.clone(), start);
         let noise = problem.noise_scale(&solution.values);
         let freedom = equations - subspace.rank();
         let scale = if freedom > 0 { (noise.sum_of_squares / freedom as f64).sqrt() } else { 1.0 };
-        let larger = scale.min(LARGEST_NOISE_FACTOR);
-        let smaller_rank = || problem.rank(&nominal, larger / PLAUSIBLE_ERROR, arm) < subspace.rank();
-        if noise.known && larger > 1.2 * assumed && smaller_rank() {
-            assumed = larger;
+        let covariance = problem.covariance(&solution.jacobian, &subspace);
+        let grown = if noise.known && scale.is_finite() { scale.clamp(1.0, LARGEST_NOISE_FACTOR) } else { 1.0 };
+        let drowned = covariance.diagonal().iter().any(|variance| !(grown * variance.sqrt() <= PLAUSIBLE_ERROR));
+        if drowned && subspace.rank() > 0 {
+            limit = subspace.rank() - 1;
         } else {
-            break (subspace, solution, noise, scale);
+            break (subspace, solution, noise, scale, covariance);
         }
     };
     // The shares of the dropped parameters where the fit has ended, for large errors have turned them.
@@ -130,11 +138,14 @@ pub fn identify(
     let rank = subspace.rank();
     let mut notes = Vec::new();
     if rank < structural {
+        let unseen = subspace.dropped.iter().filter(|column| structure.independent.contains(column));
+        let names: Vec<&str> = unseen.map(|&column| arm.chain.parameters[column].name.as_str()).collect();
         notes.push(format!(
-            "of the {structural} combinations that this arm's structure allows, these configurations show {rank}: the rest would be \
-             uncertain by more than {:.0} mm or mrad and is held at nominal, and what it is off by is in no standard error; measure \
-             more different configurations, or a target further from the last axis",
-            PLAUSIBLE_ERROR * 1e3
+            "of the {structural} combinations that this arm's structure allows, these configurations show {rank}: others would be \
+             uncertain by more than {:.0} mm or mrad, so that {} is held at nominal, and what it is off by is in no standard error; \
+             measure more different configurations, or a target further from the last axis",
+            PLAUSIBLE_ERROR * 1e3,
+            if names.is_empty() { "more".to_owned() } else { names.join(", ") }
         ));
     }
     let freedom = equations - rank;
@@ -161,7 +172,6 @@ pub fn identify(
     if freedom == 0 {
         notes.push("as many equations as parameters: nothing is left to tell how good the fit is".to_owned());
     }
-    let covariance = problem.covariance(&solution.jacobian, &subspace);
     let quantile = match StudentsT::new(0.0, 1.0, freedom.max(1) as f64) {
         Ok(distribution) if inflated => distribution.inverse_cdf(0.975),
         _ => 1.959_963_984_540_054,
@@ -227,6 +237,24 @@ pub fn identify(
     } else {
         solution.reason
     };
+    let held_out_errors = (!held_out.is_empty()).then(|| errors(&held_out, &at_identified));
+    let held_out_nominal = (!held_out.is_empty()).then(|| errors(&held_out, &at_nominal));
+    notes.extend(doubts(arm, &solution.values, &fit, &at_identified, &fitted));
+    match (&held_out_errors, &held_out_nominal) {
+        (Some(after), Some(before)) => {
+            if after.position_m.rms >= before.position_m.rms {
+                notes.push("held-out configurations are predicted no better than by the nominal model".to_owned());
+            }
+            if after.position_m.rms > STRANGE * fitted.position_m.rms.max(noise.position_m) {
+                notes.push(format!(
+                    "held-out errors are {:.0} times the fitted ones: were they measured in the same frame, with the same target, on \
+                     the same arm?",
+                    after.position_m.rms / fitted.position_m.rms.max(noise.position_m)
+                ));
+            }
+        }
+        _ => notes.push("nothing is held out: the errors of fitted configurations flatter".to_owned()),
+    }
     Ok(Identification {
         converged: solution.converged && rank > 0 && !astray,
         reason,
@@ -238,8 +266,9 @@ pub fn identify(
         combinations,
         nominal: errors(&fit, &at_nominal),
         fitted,
-        held_out: (!held_out.is_empty()).then(|| errors(&held_out, &at_identified)),
-        held_out_nominal: (!held_out.is_empty()).then(|| errors(&held_out, &at_nominal)),
+        held_out: held_out_errors,
+        held_out_nominal,
+        declared_noise: DeclaredNoise { position_m: noise.position_m, rotation_rad: noise.rotation_rad },
         residuals,
         notes,
     })
@@ -251,10 +280,44 @@ pub(super) fn fit_some(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement]
     let problem = Problem::new(arm, sensor, Weights::Noise, measurements).ok()?;
     let nominal = arm.chain.nominal();
     let start = problem.linearise(&nominal);
-    let seen = Subspace::reveal(&start.jacobian.select_columns(free), &vec![false; free.len()], 0.0);
+    let seen = Subspace::reveal(&start.jacobian.select_columns(free), &vec![false; free.len()], 0.0, usize::MAX);
     let columns: Vec<usize> = seen.independent.iter().map(|position| free[*position]).collect();
     let solution = solve(&problem, &columns, nominal, start);
     solution.converged.then_some(solution.values)
+}
+
+/// What a careful reader would doubt about a fit: absurd parameters, single wild readings.
+fn doubts(arm: &Arm, values: &[f64], fit: &[&Measurement], identified: &ChainAt, fitted: &Errors) -> Vec<String> {
+    let mut doubts = Vec::new();
+    let changes = arm.chain.parameters.iter().zip(values).map(|(parameter, value)| (parameter, value - parameter.nominal));
+    let far = changes.max_by(|(_, a), (_, b)| a.abs().total_cmp(&b.abs()));
+    if let Some((parameter, change)) = far.filter(|(_, change)| change.abs() > ABSURD_CHANGE) {
+        doubts.push(format!(
+            "{} is {:.0} m{} from nominal: is it this robot, and are the units right?",
+            parameter.name,
+            change.abs() * 1e3,
+            parameter.quantity.unit()
+        ));
+    }
+    let mut wild: Vec<(f64, &&Measurement)> =
+        fit.iter().map(|measurement| (residual(measurement, identified).fixed_rows::<3>(0).norm(), measurement)).collect();
+    wild.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+    // Against the median, which a few wild readings do not move.
+    let usual = wild.get(wild.len() / 2).map_or(0.0, |(length, _)| *length).max(fitted.position_m.min);
+    let wild: Vec<String> = wild
+        .iter()
+        .take_while(|(length, _)| *length > WILD * usual && *length > 1e-12)
+        .take(5)
+        .map(|(length, row)| format!("{} (pose_id {}) by {:.3} mm", row.index, row.pose_id, length * 1e3))
+        .collect();
+    if !wild.is_empty() {
+        doubts.push(format!(
+            "some readings are far off, the median being {:.3} mm: measurement {}; they pull the fit, look at them",
+            usual * 1e3,
+            wild.join(", ")
+        ));
+    }
+    doubts
 }
 
 /// Errors of the model `chain` on `measurements`.
@@ -322,6 +385,9 @@ struct Linearised {
 struct NoiseScale {
     sum_of_squares: f64,
     known: bool,
+    /// RMS length of the declared noise of a position (m) and, where it is measured, of an attitude (rad).
+    position_m: f64,
+    rotation_rad: Option<f64>,
 }
 
 impl<'a> Problem<'a> {
@@ -410,7 +476,12 @@ impl<'a> Problem<'a> {
                 }
             }
         }
-        NoiseScale { sum_of_squares, known }
+        let rms = |part: usize| {
+            let squares: f64 = self.rows.iter().map(|row| 3.0 * row.sigma[part].powi(2)).sum();
+            (squares / self.rows.len().max(1) as f64).sqrt()
+        };
+        let rotation_rad = (self.rows_per_pose == 6).then(|| rms(1));
+        NoiseScale { sum_of_squares, known, position_m: rms(0), rotation_rad }
     }
 
     /// The weighted Jacobian with rows in units of the declared sigma instead.
@@ -423,10 +494,6 @@ impl<'a> Problem<'a> {
             row *= 1.0 / (weights.weight[part] * weights.sigma[part].max(1e-9));
         }
         scaled
-    }
-
-    fn rank(&self, values: &[f64], floor: f64, arm: &Arm) -> usize {
-        Subspace::reveal(&self.in_sigmas(&self.linearise(values).jacobian), &late(arm), floor).rank()
     }
 
     /// Covariance of the independent parameters from the declared noise: `A Jᵀ W Σ W J A` with `A = (Jᵀ J)⁻¹` of the weighted
@@ -605,7 +672,7 @@ fn expression(arm: &Arm, subspace: &Subspace, position: usize) -> String {
     let mut text = arm.chain.parameters[subspace.independent[position]].name.clone();
     for (other, &column) in subspace.dropped.iter().enumerate() {
         let share = subspace.share[(position, other)];
-        if share.abs() > 1e-6 {
+        if share.abs() >= 5e-5 {
             let sign = if share < 0.0 { '−' } else { '+' };
             text.push_str(&format!(" {sign} {:.4}·{}", share.abs(), arm.chain.parameters[column].name));
         }

@@ -33,6 +33,8 @@ pub struct Identification {
     /// Errors of the nominal model on held-out configurations.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held_out_nominal: Option<Errors>,
+    /// How far a single reading of an exactly known pose would be off: the floor under every error above.
+    pub declared_noise: DeclaredNoise,
     /// Residuals of every configuration, in the order of measuring.
     pub residuals: Vec<Residual>,
     /// What was assumed or left out.
@@ -75,6 +77,16 @@ pub struct Combination {
     pub interval95: [f64; 2],
     /// `m` or `rad`.
     pub unit: String,
+}
+
+/// Root of the mean squared length of the declared noise of the fitted configurations.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DeclaredNoise {
+    /// Of a position (three axes), m.
+    pub position_m: f64,
+    /// Of an attitude (three axes), rad; absent where no attitude was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation_rad: Option<f64>,
 }
 
 /// Errors over a set of configurations.

@@ -47,9 +47,9 @@ impl Subspace {
     /// does not hang on which of two nearly equal columns is larger.
     ///
     /// `floor` is the singular value of `jacobian` itself below which a direction counts as not seen at all; zero where only exact
-    /// dependence counts.
+    /// dependence counts. No more than `limit` columns are taken.
     #[must_use]
-    pub fn reveal(jacobian: &DMatrix<f64>, late: &[bool], floor: f64) -> Subspace {
+    pub fn reveal(jacobian: &DMatrix<f64>, late: &[bool], floor: f64, limit: usize) -> Subspace {
         let columns = jacobian.ncols();
         let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
         let largest = norms.iter().copied().fold(0.0, f64::max);
@@ -66,7 +66,7 @@ impl Subspace {
         let threshold = singular_values.first().copied().unwrap_or(0.0) * RELATIVE_TOLERANCE;
         let exact = singular_values.iter().filter(|value| **value > threshold).count();
         let seen = triangle.singular_values().iter().filter(|value| **value > floor).count();
-        let rank = if floor > 0.0 { exact.min(seen) } else { exact };
+        let rank = if floor > 0.0 { exact.min(seen) } else { exact }.min(limit);
 
         let mut rest = triangle.clone();
         let mut independent = Vec::with_capacity(rank);
@@ -119,7 +119,7 @@ impl Subspace {
             let (_, jacobian) = chain.jacobian(&joints);
             stacked.rows_mut(sample * rows_per_pose, rows_per_pose).copy_from(&jacobian.rows(0, rows_per_pose));
         }
-        Subspace::reveal(&stacked, &late(arm), 0.0)
+        Subspace::reveal(&stacked, &late(arm), 0.0, usize::MAX)
     }
 }
 
@@ -151,13 +151,13 @@ mod tests {
     fn a_redundant_column_is_dropped_and_its_share_told() {
         // Third column = 0.2 × first − 0.1 × second; the fourth is not seen at all.
         let jacobian = DMatrix::from_row_slice(3, 4, &[1.0, 0.0, 0.2, 0.0, 0.0, 1.0, -0.1, 0.0, 1.0, 1.0, 0.1, 0.0]);
-        let subspace = Subspace::reveal(&jacobian, &[false; 4], 0.0);
+        let subspace = Subspace::reveal(&jacobian, &[false; 4], 0.0, usize::MAX);
         assert_eq!((subspace.rank(), &subspace.independent, &subspace.dropped), (2, &vec![0, 1], &vec![2, 3]));
         assert!((subspace.share.column(0) - nalgebra::dvector![0.2, -0.1]).norm() < 1e-14);
         assert!(subspace.share.column(1).norm() < 1e-14);
-        let other = Subspace::reveal(&jacobian, &[true, false, false, false], 0.0);
+        let other = Subspace::reveal(&jacobian, &[true, false, false, false], 0.0, usize::MAX);
         assert_eq!(other.independent, vec![1, 2]);
         // What is seen less than the floor is not seen.
-        assert_eq!(Subspace::reveal(&jacobian, &[false; 4], 1.1).rank(), 1);
+        assert_eq!(Subspace::reveal(&jacobian, &[false; 4], 1.1, usize::MAX).rank(), 1);
     }
 }

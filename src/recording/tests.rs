@@ -13,7 +13,7 @@ use super::*;
 use crate::arm::{Arm, Fixture, Geometry, Link, Shape};
 use crate::design::outcome::{DesignOutcome, EvennessDomains, RandomReference, StopReason, SwarmIteration};
 use crate::frames::{Pose, pose_error};
-use crate::identification::outcome::{Combination, Errors, Identification, ParameterEstimate, Residual, Summary};
+use crate::identification::outcome::{Combination, DeclaredNoise, Errors, Identification, ParameterEstimate, Residual, Summary};
 use crate::kinematics::chain::{Joint, JointKind};
 use crate::kinematics::mdh;
 use crate::measurement::{Measurement, Role};
@@ -191,6 +191,7 @@ fn events(size: &Size) -> Vec<Event> {
         fitted: errors(&mut stream, false),
         held_out: Some(errors(&mut stream, true)),
         held_out_nominal: None,
+        declared_noise: DeclaredNoise { position_m: 5e-5, rotation_rad: None },
         residuals: (0..size.measurements)
             .map(|index| Residual {
                 index,

@@ -109,7 +109,9 @@ pub fn settling(truth: &crate::cell::Truth) -> SettlingReport {
         steps as f64 / count.max(1) as f64
     );
     if undecided > 0 {
-        text.push_str(&format!("; in {undecided} some play is not decided by the load and rests in its middle"));
+        text.push_str(&format!(
+            ";\nplay that no load decides (such as along a level axis) rests in its middle: somewhere in {undecided} of them"
+        ));
     }
     text.push_str(".\n");
     SettlingReport { settled, text }
@@ -140,6 +142,22 @@ pub fn identification(identification: &Identification) -> String {
         identification.equations,
         identification.residual_scale.map(|scale| format!("; residuals {scale:.2} × declared noise")).unwrap_or_default(),
     ));
+    let noise = &identification.declared_noise;
+    if noise.position_m > 0.0 {
+        text.push_str(&format!(
+            "Of every error above, {} mm RMS is the declared noise of the reading itself",
+            number(noise.position_m * 1e3)
+        ));
+        match noise.rotation_rad {
+            Some(rotation) if rotation > 0.0 => text.push_str(&format!(" ({}°).\n", number(rotation.to_degrees()))),
+            _ => text.push_str(".\n"),
+        }
+    }
+    let held: Vec<&str> =
+        identification.parameters.iter().filter(|parameter| parameter.dropped).map(|parameter| parameter.name.as_str()).collect();
+    if !held.is_empty() {
+        text.push_str(&format!("Held at nominal: {}.\n", held.join(", ")));
+    }
     for note in &identification.notes {
         text.push_str(&format!("Note: {note}{}\n", if note.ends_with('?') { "" } else { "." }));
     }

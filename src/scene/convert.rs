@@ -471,6 +471,11 @@ fn plan(file: &PlanToml) -> Checked<Plan> {
     })
 }
 
+/// A play, no larger than a small motion: beyond it the seat of a bearing is another thing, and a unit was probably mistaken.
+fn play(value: f64, most: f64, key: String) -> Checked<f64> {
+    at_most(not_negative(value, &key)?, most, &key)
+}
+
 /// The hidden part, checked against the arm it is about.
 pub(super) fn injected(file: &InjectedToml, arm: &Arm) -> Checked<Injected> {
     let parameters = &file.parameters;
@@ -494,9 +499,9 @@ pub(super) fn injected(file: &InjectedToml, arm: &Arm) -> Checked<Injected> {
         }
         clearances.push(JointClearance {
             joint,
-            radial_m: metres_from_um(not_negative(clearance.radial_um, &format!("{key}.radial_um"))?),
-            axial_m: metres_from_um(not_negative(clearance.axial_um, &format!("{key}.axial_um"))?),
-            tilt_rad: not_negative(clearance.tilt_urad, &format!("{key}.tilt_urad"))? / 1e6,
+            radial_m: metres_from_um(play(clearance.radial_um, 1e3, format!("{key}.radial_um"))?),
+            axial_m: metres_from_um(play(clearance.axial_um, 1e3, format!("{key}.axial_um"))?),
+            tilt_rad: play(clearance.tilt_urad, 1e4, format!("{key}.tilt_urad"))? / 1e6,
         });
     }
     let thermal = file.thermal.as_ref().map(|thermal| self::thermal(thermal, arm)).transpose()?;

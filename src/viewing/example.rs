@@ -10,7 +10,7 @@ use super::{Target, Viewer, ViewerError, open};
 use crate::arm::{Arm, Fixture, Geometry, Inertial, Link, Shape};
 use crate::design::outcome::{DesignOutcome, EvennessDomains, RandomReference, StopReason, SwarmIteration};
 use crate::frames::{Pose, pose_error, rotation_from_vector};
-use crate::identification::outcome::{Errors, Identification, ParameterEstimate, Residual, Summary};
+use crate::identification::outcome::{DeclaredNoise, Errors, Identification, ParameterEstimate, Residual, Summary};
 use crate::kinematics::mdh::{Frame, chain};
 use crate::kinematics::{Joint, JointKind, Quantity};
 use crate::measurement::{Measurement, Role};
@@ -238,6 +238,7 @@ fn events(particles: usize, count: usize, iterations: usize, held_out: usize) ->
         fitted: errors(|r| &r.identified, fit),
         held_out: Some(errors(|r| &r.identified, verify)),
         held_out_nominal: Some(errors(|r| &r.nominal, verify)),
+        declared_noise: DeclaredNoise { position_m: 5e-5, rotation_rad: Some(1e-4) },
         residuals: residuals.clone(),
         notes: vec!["attitude weighted by its declared sigma".to_owned()],
     }));

@@ -107,7 +107,7 @@ fn overrides_that_are_wrong() {
         ("design.swarm=5", "a table"),
         ("seed=9223372036854775808", ""),
         ("name=\"../elsewhere\"", "a-z 0-9"),
-        ("injected.clearance[1].radial_um=2000", "radial clearance"),
+        ("injected.clearance[1].radial_um=2000", "allowed: 1000 at most"),
     ] {
         refuse(&["run", "scenes/arm8.toml", "--set", "design.swarm.iterations=5", "--set", assignment], &[expected]);
     }
