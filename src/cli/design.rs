@@ -14,7 +14,7 @@ pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result
     session::start("design", &file.public_toml()?, &mut audience)?;
     let outcome = design::design(&file.scene, &mut audience)?;
     let recording = audience.finish()?;
-    output::show(global, &report::design(&outcome, file.scene.arm.chain.parameters.len()))?;
+    output::show(global, &report::design(&outcome, file.scene.arm.chain.parameters.len(), file.scene.design.jacobian_scaling))?;
     if let Some(recording) = &recording {
         output::show(global, &format!("Recording   {}", recording.display()))?;
     }

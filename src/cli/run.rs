@@ -33,7 +33,7 @@ pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result
 
     let parameter_count = scene.arm.chain.parameters.len();
     output::show(global, &format!("{}: {}\n{}\n", scene.name, scene.description, scene.arm_note))?;
-    output::show(global, &report::design(&run.design, parameter_count))?;
+    output::show(global, &report::design(&run.design, parameter_count, scene.design.jacobian_scaling))?;
     output::show(global, &report::settling(&run.truth).text)?;
     output::show(global, &report::identification(&run.identification))?;
     if let Some(recording) = &recording {

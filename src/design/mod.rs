@@ -37,7 +37,7 @@ pub fn design(scene: &Scene, listener: &mut dyn Listener) -> Result<DesignOutcom
     let problem = &scene.design;
     let attitude = scene.sensor.attitude_sigma_rad.is_some();
     let check = CollisionCheck::new(arm);
-    let evaluator = Evaluator::new(arm, attitude, problem.evenness_domain, problem.evenness_step_m);
+    let evaluator = Evaluator::new(arm, attitude, problem.evenness_domain, problem.evenness_step_m, problem.jacobian_scaling);
     let random = random_sets(scene, &evaluator, &check)?;
 
     let mut stream = stream(scene.seed, "design/choose");

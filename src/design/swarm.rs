@@ -224,7 +224,13 @@ mod tests {
     fn optimise_cell(threads: usize) -> (Optimum, Vec<SwarmIteration>) {
         let file = cell();
         let scene = &file.scene;
-        let evaluator = Evaluator::new(&scene.arm, true, scene.design.evenness_domain, scene.design.evenness_step_m);
+        let evaluator = Evaluator::new(
+            &scene.arm,
+            true,
+            scene.design.evenness_domain,
+            scene.design.evenness_step_m,
+            scene.design.jacobian_scaling,
+        );
         let check = CollisionCheck::new(&scene.arm);
         let settings = Swarm { particles: 6, iterations: 15, ..scene.design.swarm.clone() };
         let mut told = Vec::new();

@@ -126,7 +126,8 @@ pub fn identify(
         let scale = if freedom > 0 { (noise.sum_of_squares / freedom as f64).sqrt() } else { 1.0 };
         let covariance = problem.covariance(&solution.jacobian, &subspace);
         let grown = if noise.known && scale.is_finite() { scale.clamp(1.0, LARGEST_NOISE_FACTOR) } else { 1.0 };
-        let drowned = covariance.diagonal().iter().any(|variance| !(grown * variance.sqrt() <= PLAUSIBLE_ERROR));
+        let hopeless = |variance: &f64| variance.is_nan() || grown * variance.sqrt() > PLAUSIBLE_ERROR;
+        let drowned = covariance.diagonal().iter().any(hopeless);
         if drowned && subspace.rank() > 0 {
             limit = subspace.rank() - 1;
         } else {

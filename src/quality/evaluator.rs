@@ -8,15 +8,15 @@ use super::observability::observability;
 use super::subspace::Subspace;
 use crate::arm::Arm;
 use crate::kinematics::ChainAt;
-use crate::scene::EvennessDomain;
+use crate::scene::{EvennessDomain, JacobianScaling};
 
 /// Evaluates sets of configurations of one arm at its nominal parameters.
 ///
-/// The Jacobian is unscaled SI (metres and radians as they are), the paper's reading: O1–O3 depend on that choice.
 pub struct Evaluator {
     chain: ChainAt,
     subspace: Subspace,
     grid: WorkspaceGrid,
+    scaling: JacobianScaling,
     /// 6 with attitude, 3 for positions only.
     rows_per_pose: usize,
     joint_count: usize,
@@ -33,11 +33,12 @@ pub struct Scratch {
 impl Evaluator {
     /// Prepares the evaluation: the identifiable subspace and the workspace grid.
     #[must_use]
-    pub fn new(arm: &Arm, attitude: bool, domain: EvennessDomain, step_m: f64) -> Self {
+    pub fn new(arm: &Arm, attitude: bool, domain: EvennessDomain, step_m: f64, scaling: JacobianScaling) -> Self {
         Evaluator {
             chain: arm.chain.at_nominal(),
             subspace: Subspace::of_structure(arm, attitude),
             grid: WorkspaceGrid::new(arm, domain, step_m),
+            scaling,
             rows_per_pose: if attitude { 6 } else { 3 },
             joint_count: arm.joint_count(),
         }
@@ -112,7 +113,23 @@ impl Evaluator {
             scratch.end_points.push(end_point);
             accumulate(&scratch.rows[..self.rows_per_pose * n], n, &mut scratch.gram);
         }
-        let gram = DMatrix::from_fn(n, n, |row, column| scratch.gram[row.max(column) * n + row.min(column)]);
+        let entry = |row: usize, column: usize| scratch.gram[row.max(column) * n + row.min(column)];
+        let gram = match self.scaling {
+            JacobianScaling::Si => DMatrix::from_fn(n, n, entry),
+            JacobianScaling::PerPose => {
+                let share = 1.0 / scratch.end_points.len().max(1) as f64;
+                DMatrix::from_fn(n, n, |row, column| share * entry(row, column))
+            }
+            JacobianScaling::Columns => {
+                // A column that is zero stays so.
+                let over = |column: usize| {
+                    let square = entry(column, column);
+                    if square > 0.0 { 1.0 / square.sqrt() } else { 0.0 }
+                };
+                let scale: Vec<f64> = (0..n).map(over).collect();
+                DMatrix::from_fn(n, n, |row, column| scale[row] * scale[column] * entry(row, column))
+            }
+        };
         gram.symmetric_eigenvalues().iter().copied().collect()
     }
 }
@@ -170,7 +187,7 @@ mod tests {
     fn indexes_are_those_of_the_singular_values_of_the_stacked_jacobian() {
         let arm = paper().scene.arm;
         for attitude in [true, false] {
-            let evaluator = Evaluator::new(&arm, attitude, EvennessDomain::Reachable, 0.1);
+            let evaluator = Evaluator::new(&arm, attitude, EvennessDomain::Reachable, 0.1, JacobianScaling::Si);
             let rank = evaluator.subspace().rank();
             assert_eq!(rank, if attitude { 36 } else { 33 });
             let set = random_set(&arm, 40, "test/evaluator");
@@ -202,9 +219,22 @@ mod tests {
     }
 
     #[test]
+    fn scaling_does_what_its_name_says() {
+        let arm = paper().scene.arm;
+        let set = random_set(&arm, 40, "test/scaling");
+        let with =
+            |scaling| Evaluator::new(&arm, true, EvennessDomain::Reachable, 0.1, scaling).evaluate(&set, &mut Scratch::default());
+        let (si, per_pose, columns) = (with(JacobianScaling::Si), with(JacobianScaling::PerPose), with(JacobianScaling::Columns));
+        assert!((per_pose.o3 * 40f64.sqrt() - si.o3).abs() < 1e-12 * si.o3);
+        assert!((per_pose.o2 - si.o2).abs() < 1e-12);
+        // The squares of the singular values of 45 columns of length one add up to 45.
+        assert!(columns.o3 <= (45.0f64 / 36.0).sqrt() && columns.o3 > 0.01 && columns.rank == 36);
+    }
+
+    #[test]
     fn too_few_configurations_observe_nothing() {
         let arm = paper().scene.arm;
-        let evaluator = Evaluator::new(&arm, true, EvennessDomain::Reachable, 0.1);
+        let evaluator = Evaluator::new(&arm, true, EvennessDomain::Reachable, 0.1, JacobianScaling::Si);
         let indexes = evaluator.evaluate(&random_set(&arm, 5, "test/few"), &mut Scratch::default());
         assert_eq!((indexes.rank, indexes.o1, indexes.o3), (30, 0.0, 0.0));
     }

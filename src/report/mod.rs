@@ -5,6 +5,7 @@ use comfy_table::{Cell, CellAlignment, LineStyle, Table, TableStyle};
 use crate::design::outcome::{DesignOutcome, StopReason};
 use crate::identification::outcome::{Errors, Identification, Summary};
 use crate::quality::Indexes;
+use crate::scene::JacobianScaling;
 
 /// Lines above and below, and one under the header.
 const STYLE: TableStyle = TableStyle::new()
@@ -29,7 +30,12 @@ fn cell(column: usize, text: &str) -> Cell {
 
 /// Indexes of the chosen set beside random sets of the same size.
 #[must_use]
-pub fn design(outcome: &DesignOutcome, parameter_count: usize) -> String {
+pub fn design(outcome: &DesignOutcome, parameter_count: usize, scaling: JacobianScaling) -> String {
+    let scaling = match scaling {
+        JacobianScaling::Si => "none, m and rad",
+        JacobianScaling::PerPose => "per pose, m and rad over √m",
+        JacobianScaling::Columns => "columns of length one",
+    };
     let atan = |value: f64| std::f64::consts::FRAC_2_PI * libm::atan(value);
     let row = |name: &str, get: &dyn Fn(&Indexes) -> f64| {
         let random = &outcome.random;
@@ -64,7 +70,8 @@ pub fn design(outcome: &DesignOutcome, parameter_count: usize) -> String {
     text.push_str(&format!(
         "\n{} configurations by {}: {} evaluations, {} colliding configurations refused, stopped: {}.\n\
          Identifiable: {} of {parameter_count} parameters; held at nominal: {dropped}.\n\
-         Singular values are of the unscaled SI Jacobian on the identifiable subspace; the last column counts all {parameter_count}.\n\
+         Singular values are of the Jacobian (scaling: {scaling}) on the identifiable subspace; the last column counts all \
+         {parameter_count}.\n\
          Evenness: reachable workspace {:.3}, bounding cube {:.3}.\n",
         outcome.configurations.len(),
         outcome.method,

@@ -5,7 +5,8 @@ use nalgebra::{Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use super::error::{Invalid, suggestion};
 use super::file::*;
 use super::{
-    DesignProblem, EvennessDomain, Injected, JointClearance, Method, Noise, Plan, Scene, Swarm, Thermal, ThermalProfile, Weights,
+    DesignProblem, EvennessDomain, Injected, JacobianScaling, JointClearance, Method, Noise, Plan, Scene, Swarm, Thermal,
+    ThermalProfile, Weights,
 };
 use crate::arm::{Arm, Fixture, Geometry, Inertial, Link, Shape};
 use crate::frames::Pose;
@@ -449,6 +450,11 @@ fn design(file: &DesignToml, arm: &Arm, sensor: &Sensor) -> Checked<DesignProble
             EvennessDomainToml::BoundingCube => EvennessDomain::BoundingCube,
         },
         evenness_step_m: step_m,
+        jacobian_scaling: match file.jacobian_scaling {
+            JacobianScalingToml::Si => JacobianScaling::Si,
+            JacobianScalingToml::PerPose => JacobianScaling::PerPose,
+            JacobianScalingToml::Columns => JacobianScaling::Columns,
+        },
         random_sets: count(file.random_sets, 1000, "design.random_sets", "the chosen set is compared with random ones")?,
     })
 }

@@ -289,6 +289,9 @@ pub struct DesignToml {
     /// Step of the grid over the workspace, mm. Default: 100.
     #[serde(default = "evenness_step_mm")]
     pub evenness_step_mm: f64,
+    /// How the error Jacobian is scaled before its singular values are taken. Default: si.
+    #[serde(default)]
+    pub jacobian_scaling: JacobianScalingToml,
     /// Random sets that the chosen one is compared with. Default: 30.
     #[serde(default = "random_sets")]
     pub random_sets: usize,
@@ -325,6 +328,19 @@ pub enum EvennessDomainToml {
     Reachable,
     /// The cube around that.
     BoundingCube,
+}
+
+/// How the error Jacobian is scaled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JacobianScalingToml {
+    /// Metres and radians as they are, all configurations stacked: the paper's reading.
+    #[default]
+    Si,
+    /// The same over the root of the number of configurations.
+    PerPose,
+    /// Every column of length one.
+    Columns,
 }
 
 /// `[design.swarm]`: the particle swarm; the defaults are the paper's Table 5.

@@ -52,6 +52,8 @@ pub struct DesignProblem {
     pub evenness_domain: EvennessDomain,
     /// Step of the grid over which the evenness takes its supremum, m.
     pub evenness_step_m: f64,
+    /// Scaling of the error Jacobian before its singular values are taken.
+    pub jacobian_scaling: JacobianScaling,
     /// Random sets that the chosen one is compared with.
     pub random_sets: usize,
 }
@@ -78,6 +80,17 @@ pub struct Swarm {
     pub velocity_factor: f64,
     /// τ of eq. 38.
     pub tau: f64,
+}
+
+/// How the error Jacobian is scaled before its singular values are taken: O1, O3 and all that is made of them depend on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JacobianScaling {
+    /// Metres and radians as they are, all configurations stacked (the paper's reading).
+    Si,
+    /// The same over the root of the number of configurations, so that more configurations alone raise no index.
+    PerPose,
+    /// Every column of length one, so that the parameters' units do not matter.
+    Columns,
 }
 
 /// Which points count as workspace in eq. 25.

@@ -23,7 +23,7 @@ fn scene(name: &str) -> SceneFile {
 
 fn evaluator(file: &SceneFile) -> Evaluator {
     let design = &file.scene.design;
-    Evaluator::new(&file.scene.arm, true, design.evenness_domain, design.evenness_step_m)
+    Evaluator::new(&file.scene.arm, true, design.evenness_domain, design.evenness_step_m, design.jacobian_scaling)
 }
 
 /// One evaluation of O_C with m = 40, collision checks of all 40 configurations included. Mark: 300 µs on one core.
