@@ -65,8 +65,8 @@ impl Subspace {
         singular_values.sort_by(|a, b| b.total_cmp(a));
         let threshold = singular_values.first().copied().unwrap_or(0.0) * RELATIVE_TOLERANCE;
         let exact = singular_values.iter().filter(|value| **value > threshold).count();
-        let seen = triangle.singular_values().iter().filter(|value| **value > floor).count();
-        let rank = if floor > 0.0 { exact.min(seen) } else { exact }.min(limit);
+        let seen = || triangle.singular_values().iter().filter(|value| **value > floor).count();
+        let rank = if floor > 0.0 { exact.min(seen()) } else { exact }.min(limit);
 
         let mut rest = triangle.clone();
         let mut independent = Vec::with_capacity(rank);
