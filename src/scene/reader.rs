@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::convert;
-use super::error::{Invalid, Located, SceneError, in_our_words};
+use super::error::{Invalid, Located, Problem, SceneError, in_our_words};
 use super::file::{InjectedOnlyToml, MethodToml, SceneToml, WeightsToml};
 use super::magnitude::too_large;
 use super::{Injected, Scene};
@@ -36,6 +36,17 @@ pub fn read(path: &Path) -> Result<SceneFile, SceneError> {
 /// # Errors
 /// If it is not a valid scene.
 pub fn parse(text: &str, origin: &str) -> Result<SceneFile, SceneError> {
+    if text.trim_start().starts_with('<') {
+        return Err(SceneError::Invalid(Box::new(Problem {
+            origin: origin.to_owned(),
+            position: Some((1, 1)),
+            key: String::new(),
+            found: "XML, such as a URDF".to_owned(),
+            allowed: "a scene in TOML".to_owned(),
+            remedy: "give a scene such as scenes/arm8.toml; a URDF goes with a table to `kincal identify TABLE --robot URDF`"
+                .to_owned(),
+        })));
+    }
     let located = Located::parse(text, origin)?;
     let toml: SceneToml = deserialise(text, &located, origin)?;
     validated(toml).map_err(|invalid| located.error(invalid, origin))
