@@ -9,7 +9,7 @@ use crate::cell::measure::plan;
 use crate::design::candidates::Sampler;
 use crate::design::swarm::split;
 use crate::identification::identify;
-use crate::recording::event::{Event, Listener, ListenerError};
+use crate::recording::event::Nobody;
 use crate::scene::{Injected, Scene};
 use crate::seed::{derive, stream};
 use crate::self_collision::CollisionCheck;
@@ -112,14 +112,6 @@ fn one(scene: &Scene, injected: &Injected, count: usize, trial: usize) -> Result
         }
         _ => None,
     })
-}
-
-struct Nobody;
-
-impl Listener for Nobody {
-    fn take(&mut self, _: &Event) -> Result<(), ListenerError> {
-        Ok(())
-    }
 }
 
 impl Mean {

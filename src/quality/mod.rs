@@ -18,7 +18,7 @@ pub struct Indexes {
     pub o3: f64,
     /// Noise amplification index, σ_min² / σ_max (Nahvi and Hollerbach 1996).
     pub o4: f64,
-    /// A-optimality, 1 / Σ σ⁻² (Sun and Hollerbach 2008).
+    /// One over the sum of the reciprocal singular values (Sun and Hollerbach 2008).
     pub o5: f64,
     /// Improved Φp-optimality (Wang et al. 2018).
     pub o6: f64,

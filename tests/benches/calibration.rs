@@ -8,7 +8,7 @@ use kincal::design::swarm::{optimise, split};
 use kincal::identification::identify;
 use kincal::measurement::Measurement;
 use kincal::quality::evaluator::{Evaluator, Scratch};
-use kincal::recording::event::{Event, Listener, ListenerError};
+use kincal::recording::event::Nobody;
 use kincal::scene::SceneFile;
 use kincal::seed::stream;
 use kincal::self_collision::{self, CollisionCheck};
@@ -88,12 +88,4 @@ fn measurements(file: &SceneFile, count: usize) -> Vec<Measurement> {
     let planned = plan(&file.scene, &split(&chosen, 8), &[]);
     let injected = file.injected.as_ref().expect("a scene to simulate");
     measure(&file.scene, injected, &planned, planned.len(), &mut Nobody).expect("measurements").0
-}
-
-struct Nobody;
-
-impl Listener for Nobody {
-    fn take(&mut self, _: &Event) -> Result<(), ListenerError> {
-        Ok(())
-    }
 }

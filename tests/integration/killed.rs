@@ -1,24 +1,32 @@
 //! A run that is killed.
 
 use std::fs;
-use std::process::Stdio;
+use std::path::Path;
+use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::harness::{command, kincal, names};
+
+/// Starts a run into `out` that never ends by itself, and waits until its recording has `bytes`.
+fn endless_run(out: &Path, bytes: u64) -> Child {
+    let partial = out.join("arm8.partial.mcap");
+    let out_text = out.to_str().unwrap();
+    let arguments = ["run", "scenes/arm8.toml", "--set", "design.swarm.iterations=100000", "--out", out_text];
+    let mut child = command(&arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let begun = Instant::now();
+    while fs::metadata(&partial).map_or(0, |metadata| metadata.len()) < bytes {
+        assert!(begun.elapsed() < Duration::from_secs(60) && child.try_wait().unwrap().is_none(), "it does not record");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    child
+}
 
 #[test]
 fn a_killed_run_leaves_a_partial_recording_that_can_be_used() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
     let partial = out.join("arm8.partial.mcap");
-    let out_text = out.to_str().unwrap();
-    let arguments = ["run", "scenes/arm8.toml", "--set", "design.swarm.iterations=100000", "--out", out_text];
-    let mut child = command(&arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-    let begun = Instant::now();
-    while fs::metadata(&partial).map_or(0, |metadata| metadata.len()) < 300_000 {
-        assert!(begun.elapsed() < Duration::from_secs(60) && child.try_wait().unwrap().is_none(), "it does not record");
-        std::thread::sleep(Duration::from_millis(10));
-    }
+    let mut child = endless_run(out, 300_000);
     // SIGKILL: no handler, no destructor.
     child.kill().unwrap();
     assert!(!child.wait().unwrap().success());
@@ -50,15 +58,7 @@ fn a_killed_run_leaves_a_partial_recording_that_can_be_used() {
 fn two_runs_of_one_name_do_not_write_into_each_other() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
-    let partial = out.join("arm8.partial.mcap");
-    let out_text = out.to_str().unwrap();
-    let arguments = ["run", "scenes/arm8.toml", "--set", "design.swarm.iterations=100000", "--out", out_text];
-    let mut child = command(&arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-    let begun = Instant::now();
-    while fs::metadata(&partial).map_or(0, |metadata| metadata.len()) < 1000 {
-        assert!(begun.elapsed() < Duration::from_secs(60), "it does not record");
-        std::thread::sleep(Duration::from_millis(10));
-    }
+    let mut child = endless_run(out, 1000);
     let ran = kincal(out, &["run", "scenes/arm8.toml", "--set", "design.swarm.iterations=5"]).ends(2);
     child.kill().unwrap();
     child.wait().unwrap();
