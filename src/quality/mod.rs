@@ -1,7 +1,9 @@
 //! How good a set of configurations is: observability (O1–O6), globality (dispersion, evenness), and both together (O_C).
 
+pub mod dense;
 pub mod evaluator;
 pub mod globality;
+pub mod information;
 pub mod observability;
 pub mod subspace;
 
