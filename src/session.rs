@@ -212,7 +212,7 @@ pub fn replay(
                 let repeated = start_event(&start.command, &start.scene);
                 listener.take(&Event::Start(Start { poses: start.poses, real: start.real.clone(), ..repeated }))?;
             }
-            Event::Swarm(_) | Event::Designed(_) => {
+            Event::Swarm(_) | Event::Search(_) | Event::Designed(_) => {
                 // Once: the design tells all its events itself.
                 if let (false, Subject::Scene(scene)) = (designed, subject) {
                     designed = true;

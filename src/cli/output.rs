@@ -248,6 +248,13 @@ impl Progress {
                 self.start("measuring", outcome.configurations.len() as u64);
             }
             Event::Measured(measurement) => self.bar.set_position(measurement.index as u64 + 1),
+            Event::Search(step) => {
+                if step.step == 0 {
+                    self.start("choosing", step.budget);
+                }
+                self.bar.set_position(step.evaluations);
+                self.bar.set_message(format!("best {:.4}", step.best));
+            }
             Event::Start(_) | Event::Identified(_) | Event::Note(_) => {}
         }
     }

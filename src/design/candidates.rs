@@ -1,22 +1,65 @@
-//! Configurations that may be measured: within the joint limits and free of collisions.
+//! Configurations that may be measured: within the joint limits, free of collisions, and where the sensor sees them.
 
 use crate::arm::Arm;
+use crate::kinematics::ChainAt;
+use crate::measurement::Sensor;
 use crate::seed::Stream;
-use crate::self_collision::{CollisionCheck, Contact, Scratch};
+use crate::self_collision::{self, CollisionCheck, Contact};
 
 /// Draws after which a cell counts as one in which the arm cannot move.
 const DRAWS: usize = 20_000;
 
-/// Draws configurations uniformly within the limits, refusing those that collide.
-pub struct Sampler<'a> {
+/// What every configuration must keep to, by whatever method it is chosen.
+pub struct Rules<'a> {
     arm: &'a Arm,
-    check: &'a CollisionCheck,
-    scratch: Scratch,
+    check: CollisionCheck,
+    chain: ChainAt,
+    sensor: Option<&'a Sensor>,
+}
+
+/// Memory for the checks of one thread.
+pub type RulesScratch = self_collision::Scratch;
+
+impl<'a> Rules<'a> {
+    /// Rules for what `sensor` is to measure.
+    #[must_use]
+    pub fn measurable(arm: &'a Arm, sensor: &'a Sensor) -> Self {
+        Rules { sensor: Some(sensor), ..Rules::reachable(arm) }
+    }
+
+    /// Rules for where the arm may go, whether or not a sensor sees it there: its workspace.
+    #[must_use]
+    pub fn reachable(arm: &'a Arm) -> Self {
+        Rules { arm, check: CollisionCheck::new(arm), chain: arm.chain.at_nominal(), sensor: None }
+    }
+
+    /// The arm.
+    #[must_use]
+    pub fn arm(&self) -> &'a Arm {
+        self.arm
+    }
+
+    /// Whether `joints` (rad or m, within the limits) must not be measured: it collides, or the sensor does not see its end point.
+    #[must_use]
+    pub fn refuses(&self, joints: &[f64], scratch: &mut RulesScratch) -> bool {
+        self.hidden(joints) || self.check.collides(joints, scratch)
+    }
+
+    fn hidden(&self, joints: &[f64]) -> bool {
+        let _ = (joints, &self.chain, self.sensor);
+        false
+    }
+}
+
+/// Draws configurations uniformly within the limits, refusing those against the rules.
+pub struct Sampler<'a> {
+    rules: &'a Rules<'a>,
+    scratch: RulesScratch,
     /// Configurations refused so far.
     pub rejections: u64,
 }
 
-/// No configuration free of collisions was found.
+/// No configuration that may be measured was found.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "none of {draws} random configurations is free of collisions; most often {} touches {} ({share:.0} % of the draws). \
@@ -31,22 +74,22 @@ pub struct AlwaysColliding {
 }
 
 impl<'a> Sampler<'a> {
-    /// A sampler for `arm`, whose collisions `check` tells.
+    /// A sampler that keeps to `rules`.
     #[must_use]
-    pub fn new(arm: &'a Arm, check: &'a CollisionCheck) -> Self {
-        Sampler { arm, check, scratch: Scratch::default(), rejections: 0 }
+    pub fn new(rules: &'a Rules<'a>) -> Self {
+        Sampler { rules, scratch: RulesScratch::default(), rejections: 0 }
     }
 
     /// Appends one configuration (rad or m) to `out`.
     ///
     /// # Errors
-    /// If every draw collides.
+    /// If every draw is refused.
     pub fn draw_into(&mut self, stream: &mut Stream, out: &mut Vec<f64>) -> Result<(), AlwaysColliding> {
         let start = out.len();
         for _ in 0..DRAWS {
             out.truncate(start);
-            out.extend(self.arm.chain.joints.iter().map(|joint| stream.uniform(joint.lower, joint.upper)));
-            if !self.check.collides(&out[start..], &mut self.scratch) {
+            out.extend(self.rules.arm.chain.joints.iter().map(|joint| stream.uniform(joint.lower, joint.upper)));
+            if !self.rules.refuses(&out[start..], &mut self.scratch) {
                 return Ok(());
             }
             self.rejections += 1;
@@ -58,9 +101,9 @@ impl<'a> Sampler<'a> {
     /// `count` configurations, one after the other.
     ///
     /// # Errors
-    /// If every draw collides.
+    /// If every draw is refused.
     pub fn draw(&mut self, stream: &mut Stream, count: usize) -> Result<Vec<f64>, AlwaysColliding> {
-        let mut configurations = Vec::with_capacity(count * self.arm.joint_count());
+        let mut configurations = Vec::with_capacity(count * self.rules.arm.joint_count());
         for _ in 0..count {
             self.draw_into(stream, &mut configurations)?;
         }
@@ -71,8 +114,9 @@ impl<'a> Sampler<'a> {
         let mut contacts: Vec<(Contact, usize)> = Vec::new();
         let samples = 1000;
         for _ in 0..samples {
-            let joints: Vec<f64> = self.arm.chain.joints.iter().map(|joint| stream.uniform(joint.lower, joint.upper)).collect();
-            if let Some(contact) = self.check.contact(&joints) {
+            let joints: Vec<f64> =
+                self.rules.arm.chain.joints.iter().map(|joint| stream.uniform(joint.lower, joint.upper)).collect();
+            if let Some(contact) = self.rules.check.contact(&joints) {
                 match contacts.iter_mut().find(|(known, _)| *known == contact) {
                     Some((_, count)) => *count += 1,
                     None => contacts.push((contact, 1)),

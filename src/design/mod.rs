@@ -1,7 +1,13 @@
 //! Choosing the configurations to measure.
 
+pub mod best_of_random;
 pub mod candidates;
+pub mod coordinate_exchange;
+pub mod detmax;
+pub mod objective;
 pub mod outcome;
+mod pool;
+pub mod search;
 pub mod swarm;
 
 use rayon::prelude::*;
@@ -12,15 +18,15 @@ use crate::quality::globality::WorkspaceGrid;
 use crate::recording::event::{Event, Listener, ListenerError};
 use crate::scene::{EvennessDomain, Method, Scene};
 use crate::seed::stream;
-use crate::self_collision::CollisionCheck;
-use candidates::{AlwaysColliding, Sampler};
-use outcome::{DesignOutcome, EvennessDomains, RandomReference, StopReason};
-use swarm::{Optimum, SwarmError, split};
+use candidates::{AlwaysColliding, Rules, Sampler};
+use objective::{Models, Objective};
+use outcome::{DesignOutcome, EvennessDomains, RandomReference};
+use search::{SearchError, Task, Told, search, split};
 
 /// A design could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum DesignError {
-    /// No configuration is free of collisions.
+    /// No configuration may be measured.
     #[error(transparent)]
     AlwaysColliding(#[from] AlwaysColliding),
     /// Whoever records or shows the run failed.
@@ -28,79 +34,88 @@ pub enum DesignError {
     Listener(#[from] ListenerError),
 }
 
-/// Chooses the configurations of `scene` by its method, telling `listener` every iteration and the outcome.
+impl From<SearchError> for DesignError {
+    fn from(error: SearchError) -> Self {
+        match error {
+            SearchError::AlwaysColliding(error) => error.into(),
+            SearchError::Watcher(error) => error.into(),
+        }
+    }
+}
+
+/// Chooses the configurations of `scene` by its method and criterion, telling `listener` every step and the outcome.
 ///
 /// # Errors
-/// If no configuration is free of collisions, or the listener fails.
+/// If no configuration may be measured, or the listener fails.
 pub fn design(scene: &Scene, listener: &mut dyn Listener) -> Result<DesignOutcome, DesignError> {
     let arm = &scene.arm;
     let problem = &scene.design;
-    let attitude = scene.sensor.attitude_sigma_rad.is_some();
-    let check = CollisionCheck::new(arm);
-    let evaluator = Evaluator::new(arm, attitude, problem.evenness_domain, problem.evenness_step_m, problem.jacobian_scaling);
-    let random = random_sets(scene, &evaluator, &check)?;
+    let rules = Rules::measurable(arm, &scene.sensor);
+    let models = Models::new(scene)?;
+    let evaluator = &models.evaluator;
+    let random = random_sets(scene, evaluator, &rules)?;
 
-    let mut stream = stream(scene.seed, "design/choose");
-    let optimum = match problem.method {
-        Method::Pso => {
-            let watch = |iteration: &outcome::SwarmIteration| listener.take(&Event::Swarm(iteration.clone()));
-            swarm::optimise(arm, &evaluator, &check, problem.count, &problem.swarm, &mut stream, watch).map_err(|error| {
-                match error {
-                    SwarmError::AlwaysColliding(error) => DesignError::AlwaysColliding(error),
-                    SwarmError::Watcher(error) => DesignError::Listener(error),
-                }
-            })?
-        }
-        Method::Random => {
-            let mut sampler = Sampler::new(arm, &check);
-            let configurations = sampler.draw(&mut stream, problem.count)?;
-            let indexes = evaluator.evaluate(&configurations, &mut Scratch::default());
-            Optimum { configurations, indexes, evaluations: 1, rejections: sampler.rejections, stop: StopReason::Drawn }
-        }
+    let objective = Objective::new(&models, problem.criterion, arm.joint_count());
+    let budget = match problem.method {
+        Method::Pso => problem.swarm.evaluations(),
+        _ => problem.budget,
     };
+    let task = Task::new(&rules, &objective, problem.count, budget, problem.pool);
+    let mut watch = |told: Told| {
+        listener.take(&match told {
+            Told::Swarm(iteration) => Event::Swarm(iteration),
+            Told::Step(step) => Event::Search(step),
+        })
+    };
+    let found = search(problem.method, &task, &problem.swarm, &mut stream(scene.seed, "design/choose"), &mut watch)?;
 
     let mut scratch = Scratch::default();
-    let indexes_all_parameters = evaluator.evaluate_all_parameters(&optimum.configurations, &mut scratch);
+    let indexes = evaluator.evaluate(&found.configurations, &mut scratch);
+    let indexes_all_parameters = evaluator.evaluate_all_parameters(&found.configurations, &mut scratch);
     let end_points = evaluator.end_points(&scratch);
     let evenness_in = |domain| {
         if domain == problem.evenness_domain {
-            optimum.indexes.evenness
+            indexes.evenness
         } else {
             WorkspaceGrid::new(arm, domain, problem.evenness_step_m).evenness(end_points)
         }
     };
     let outcome = DesignOutcome {
         method: problem.method.name().to_owned(),
-        configurations: split(&optimum.configurations, arm.joint_count()),
-        indexes: optimum.indexes,
+        criterion: problem.criterion.name().to_owned(),
+        value: found.value,
+        configurations: split(&found.configurations, arm.joint_count()),
+        indexes,
         indexes_all_parameters,
         evenness_domains: EvennessDomains {
             reachable: evenness_in(EvennessDomain::Reachable),
             bounding_cube: evenness_in(EvennessDomain::BoundingCube),
         },
         random,
+        advice: None,
         dropped_parameters: evaluator.subspace().dropped.iter().map(|&c| arm.chain.parameters[c].name.clone()).collect(),
-        evaluations: optimum.evaluations,
-        rejections: optimum.rejections,
-        stop: optimum.stop,
+        evaluations: task.evaluations(),
+        rejections: task.rejections(),
+        stop: found.stop,
     };
     listener.take(&Event::Designed(outcome.clone()))?;
     Ok(outcome)
 }
 
-/// Configurations that verify: uniform within the limits, free of collisions, from a stream of their own.
+/// Configurations that verify: uniform within the limits and the rules, from a stream of their own.
 ///
 /// # Errors
 /// If no configuration is free of collisions.
 pub fn held_out(scene: &Scene) -> Result<Vec<Vec<f64>>, AlwaysColliding> {
-    let check = CollisionCheck::new(&scene.arm);
-    let mut sampler = Sampler::new(&scene.arm, &check);
-    let drawn = sampler.draw(&mut stream(scene.seed, "plan/held_out"), scene.plan.held_out_count)?;
+    // An exact reference sees everything; a sensor's readings must be within its view.
+    let rules =
+        if scene.plan.held_out_exact { Rules::reachable(&scene.arm) } else { Rules::measurable(&scene.arm, &scene.sensor) };
+    let drawn = Sampler::new(&rules).draw(&mut stream(scene.seed, "plan/held_out"), scene.plan.held_out_count)?;
     Ok(split(&drawn, scene.arm.joint_count()))
 }
 
-fn random_sets(scene: &Scene, evaluator: &Evaluator, check: &CollisionCheck) -> Result<RandomReference, AlwaysColliding> {
-    let mut sampler = Sampler::new(&scene.arm, check);
+fn random_sets(scene: &Scene, evaluator: &Evaluator, rules: &Rules<'_>) -> Result<RandomReference, AlwaysColliding> {
+    let mut sampler = Sampler::new(rules);
     let sets = (0..scene.design.random_sets)
         .map(|set| sampler.draw(&mut stream(scene.seed, &format!("design/random/{set}")), scene.design.count))
         .collect::<Result<Vec<_>, _>>()?;
@@ -135,16 +150,5 @@ fn fold(
         evenness: field(|i| i.evenness),
         comprehensive: field(|i| i.comprehensive),
         rank: combine_ranks(&mut indexes.iter().map(|i| i.rank)),
-    }
-}
-
-impl Method {
-    /// The method's name in scenes and results.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Method::Pso => "pso",
-            Method::Random => "random",
-        }
     }
 }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::quality::Indexes;
+use crate::quality::prediction::Prediction;
 
 /// The swarm after one iteration (iteration 0 is the initial swarm).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,6 +37,26 @@ pub struct SwarmIteration {
     pub best_configurations: Vec<Vec<f64>>,
 }
 
+/// A step of a search by any other method.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SearchStep {
+    /// Number of the step, from 0.
+    pub step: usize,
+    /// Values of the criterion so far.
+    pub evaluations: u64,
+    /// Values of the criterion that may be computed.
+    pub budget: u64,
+    /// Configurations refused so far, because they collide or the sensor does not see them.
+    pub rejections: u64,
+    /// Value of the criterion where the search is (a population's mean). Larger is better: an index as it is, the determinant of
+    /// the information as the logarithm of its r-th root, a variance (m²) as minus its logarithm.
+    pub value: f64,
+    /// The best value so far.
+    pub best: f64,
+    /// Configurations (rad or m) of the best set; empty where it is that of the step before.
+    pub best_configurations: Vec<Vec<f64>>,
+}
+
 /// Why a method stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -46,6 +67,10 @@ pub enum StopReason {
     Converged,
     /// The method makes no iterations (random sets).
     Drawn,
+    /// All values of the criterion that it may compute are computed.
+    BudgetSpent,
+    /// No change that it tries makes the set better.
+    LocalOptimum,
 }
 
 /// Mean, smallest and largest value of each index over random sets of the same size: what choosing is compared with.
@@ -64,8 +89,12 @@ pub struct RandomReference {
 /// The chosen set and how it came about.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DesignOutcome {
-    /// The method's name as in the scene: `pso`, `random`.
+    /// The method's name as in the scene: `coordinate_exchange`, `pso`, ….
     pub method: String,
+    /// The criterion's name as in the scene: `i_optimality`, `comprehensive`, ….
+    pub criterion: String,
+    /// Its value, as in [`SearchStep::value`].
+    pub value: f64,
     /// Chosen configurations, rad (m for prismatic joints), in the order of measuring.
     pub configurations: Vec<Vec<f64>>,
     /// Indexes on the identifiable subspace.
@@ -76,14 +105,37 @@ pub struct DesignOutcome {
     pub evenness_domains: EvennessDomains,
     /// Random sets of the same size.
     pub random: RandomReference,
+    /// What choosing is worth; absent where it cannot be told.
+    pub advice: Option<Advice>,
     /// Names of parameters that the others can stand in for and that are therefore held at their nominal values.
     pub dropped_parameters: Vec<String>,
-    /// Evaluations of the fitness.
+    /// Values of the criterion that were computed.
     pub evaluations: u64,
-    /// Configurations refused because they collide.
+    /// Configurations refused because they collide or the sensor does not see them.
     pub rejections: u64,
     /// Why the method stopped.
     pub stop: StopReason,
+}
+
+/// What the choice is worth, told before anything is measured: the position error over the workspace that the readings' noise will
+/// leave in the calibrated model (RMS), for this set, for random ones, and the least that any set of as many configurations can
+/// leave.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Advice {
+    /// The chosen set; absent where it does not determine the parameters.
+    pub chosen: Option<Prediction>,
+    /// Mean over the random sets that determine the parameters; absent where none does.
+    pub random: Option<Prediction>,
+    /// Smallest and largest position error of these, m.
+    pub random_range_m: [f64; 2],
+    /// Random sets that do not determine the parameters.
+    pub random_undetermined: usize,
+    /// No set of as many of the candidates leaves less than this, m: from the optimal approximate design.
+    pub bound_m: f64,
+    /// What is left between that design and its dual, as a share: the bound already allows for it.
+    pub bound_gap: f64,
+    /// Candidates among which the bound holds.
+    pub bound_candidates: usize,
 }
 
 /// Evenness (eq. 25) in both readings of "workspace".

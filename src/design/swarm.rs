@@ -11,181 +11,136 @@
 
 use rayon::prelude::*;
 
-use super::candidates::{AlwaysColliding, Sampler};
 use super::outcome::{StopReason, SwarmIteration};
-use crate::arm::Arm;
+use super::search::{Found, Scratch, SearchError, Task, Told, Watch, split};
 use crate::quality::Indexes;
-use crate::quality::evaluator::{self, Evaluator};
+use crate::quality::evaluator;
 use crate::scene::Swarm;
 use crate::seed::Stream;
-use crate::self_collision::{self, CollisionCheck};
-
-/// Where the swarm ended.
-#[derive(Clone, Debug)]
-pub struct Optimum {
-    /// The swarm's best-known position: configurations one after the other (rad or m).
-    pub configurations: Vec<f64>,
-    /// Its indexes.
-    pub indexes: Indexes,
-    /// Evaluations of the fitness.
-    pub evaluations: u64,
-    /// Configurations refused because they collide, the initial draws included.
-    pub rejections: u64,
-    /// Why it stopped.
-    pub stop: StopReason,
-}
 
 struct Particle {
     position: Vec<f64>,
     velocity: Vec<f64>,
-    indexes: Indexes,
+    value: f64,
     best_position: Vec<f64>,
-    best: Indexes,
+    best: f64,
     end_points: Vec<[f32; 3]>,
-    rejections: u64,
     moved: bool,
-    scratch: evaluator::Scratch,
-    collision_scratch: self_collision::Scratch,
+    scratch: Scratch,
 }
 
-/// An error of the search itself or of whoever watches it.
-#[derive(Debug, thiserror::Error)]
-pub enum SwarmError<E: std::error::Error> {
-    /// No configuration is free of collisions.
-    #[error(transparent)]
-    AlwaysColliding(#[from] AlwaysColliding),
-    /// The watcher refused an iteration.
-    #[error(transparent)]
-    Watcher(E),
-}
-
-/// Runs the swarm for sets of `count` configurations; `watch` sees the initial swarm and every iteration.
+/// Runs the swarm for sets of the task's size; `watch` sees the initial swarm and every iteration. Where the budget is smaller than
+/// particles × (iterations + 1), fewer iterations are made.
 ///
 /// All random numbers are drawn before particles are shared among threads: the outcome does not depend on their number.
 ///
 /// # Errors
-/// If no configuration is free of collisions, or the watcher's error.
-pub fn optimise<E: std::error::Error>(
-    arm: &Arm,
-    evaluator: &Evaluator,
-    check: &CollisionCheck,
-    count: usize,
-    settings: &Swarm,
-    stream: &mut Stream,
-    mut watch: impl FnMut(&SwarmIteration) -> Result<(), E>,
-) -> Result<Optimum, SwarmError<E>> {
-    let mut sampler = Sampler::new(arm, check);
-    let joints = &arm.chain.joints;
+/// If no configuration may be measured, or the watcher's error.
+pub fn search(task: &Task<'_>, settings: &Swarm, stream: &mut Stream, watch: &mut Watch<'_>) -> Result<Found, SearchError> {
+    let joints = &task.arm().chain.joints;
+    let affordable = usize::try_from(task.budget).unwrap_or(usize::MAX) / settings.particles.max(1);
+    let iterations = settings.iterations.min(affordable.saturating_sub(1));
     let mut particles = Vec::with_capacity(settings.particles);
     for _ in 0..settings.particles {
-        let position = sampler.draw(stream, count)?;
-        let velocity = (0..count).flat_map(|_| joints.iter()).map(|joint| stream.uniform(joint.lower, joint.upper)).collect();
+        let position = task.draw(stream, task.count)?;
+        let velocity =
+            (0..task.count).flat_map(|_| joints.iter()).map(|joint| stream.uniform(joint.lower, joint.upper)).collect();
         particles.push(Particle {
             best_position: position.clone(),
             position,
             velocity,
-            indexes: Indexes::default(),
-            best: Indexes::default(),
+            value: f64::NEG_INFINITY,
+            best: f64::NEG_INFINITY,
             end_points: Vec::new(),
-            rejections: 0,
             moved: true,
-            scratch: evaluator::Scratch::default(),
-            collision_scratch: self_collision::Scratch::default(),
+            scratch: Scratch::default(),
         });
     }
     particles.par_iter_mut().for_each(|particle| {
-        particle.evaluate(evaluator);
-        particle.best = particle.indexes;
+        particle.evaluate(task);
+        particle.best = particle.value;
     });
-    let drawn_rejections = sampler.rejections;
-    let mut evaluations = particles.len() as u64;
     let mut leader = leader_of(&particles);
     let mut swarm_best = particles[leader].best_position.clone();
-    let mut swarm_indexes = particles[leader].best;
-    let mut told_fitness = f64::NEG_INFINITY;
+    let mut swarm_value = particles[leader].best;
+    let indexes = |set: &[f64]| task.objective.models().evaluator.evaluate(set, &mut evaluator::Scratch::default());
+    let mut swarm_indexes = Indexes::default();
+    let mut told = None;
     let mut stop = StopReason::IterationLimit;
     let (mut inertia, mut c1, mut c2) = (0.0, 0.0, 0.0);
 
-    for iteration in 0..=settings.iterations {
+    for iteration in 0..=iterations {
         if iteration > 0 {
-            let k = iteration as f64 / settings.iterations as f64;
+            let k = iteration as f64 / iterations as f64;
             inertia = settings.inertia[1] - k * (settings.inertia[1] - settings.inertia[0]);
-            let mean = particles.iter().map(|particle| particle.best.comprehensive).sum::<f64>() / particles.len() as f64;
-            c1 = 4.0 - libm::exp(-settings.tau * (mean - swarm_indexes.comprehensive).abs());
+            let mean = particles.iter().map(|particle| particle.best).sum::<f64>() / particles.len() as f64;
+            c1 = 4.0 - libm::exp(-settings.tau * (mean - swarm_value).abs());
             c2 = 4.0 - c1;
             let pulls: Vec<(f64, f64)> = particles.iter().map(|_| (c1 * stream.unit(), c2 * stream.unit())).collect();
             particles.par_iter_mut().zip(pulls).for_each(|(particle, pull)| {
-                particle.step(arm, check, inertia, pull, &swarm_best, settings.velocity_factor);
-                particle.evaluate(evaluator);
-                if particle.indexes.comprehensive > particle.best.comprehensive {
-                    particle.best = particle.indexes;
+                particle.step(task, inertia, pull, &swarm_best, settings.velocity_factor);
+                particle.evaluate(task);
+                if particle.value > particle.best {
+                    particle.best = particle.value;
                     particle.best_position.copy_from_slice(&particle.position);
                 }
             });
-            evaluations += particles.len() as u64;
             let first = leader_of(&particles);
-            if particles[first].best.comprehensive > swarm_indexes.comprehensive {
+            if particles[first].best > swarm_value {
                 leader = first;
                 swarm_best.copy_from_slice(&particles[first].best_position);
-                swarm_indexes = particles[first].best;
+                swarm_value = particles[first].best;
             }
         }
-        let improved = swarm_indexes.comprehensive > told_fitness;
-        told_fitness = swarm_indexes.comprehensive;
-        watch(&SwarmIteration {
+        let improved = told.is_none_or(|told| swarm_value > told);
+        told = Some(swarm_value);
+        if improved {
+            swarm_indexes = indexes(&swarm_best);
+        }
+        watch(Told::Swarm(SwarmIteration {
             iteration,
-            iterations: settings.iterations,
-            fitness: particles.iter().map(|particle| particle.indexes.comprehensive).collect(),
-            personal_best: particles.iter().map(|particle| particle.best.comprehensive).collect(),
+            iterations,
+            fitness: particles.iter().map(|particle| particle.value).collect(),
+            personal_best: particles.iter().map(|particle| particle.best).collect(),
             best_particle: leader,
             best: swarm_indexes,
             inertia,
             c1,
             c2,
-            evaluations,
-            rejections: drawn_rejections + particles.iter().map(|particle| particle.rejections).sum::<u64>(),
+            evaluations: task.evaluations(),
+            rejections: task.rejections(),
             end_points: particles.iter().map(|particle| particle.end_points.clone()).collect(),
-            best_configurations: if improved { split(&swarm_best, arm.joint_count()) } else { Vec::new() },
-        })
-        .map_err(SwarmError::Watcher)?;
+            best_configurations: if improved { split(&swarm_best, joints.len()) } else { Vec::new() },
+        }))?;
         if iteration > 0 && particles.iter().all(|particle| !particle.moved) {
             stop = StopReason::Converged;
             break;
         }
     }
-    Ok(Optimum {
-        configurations: swarm_best,
-        indexes: swarm_indexes,
-        evaluations,
-        rejections: drawn_rejections + particles.iter().map(|particle| particle.rejections).sum::<u64>(),
-        stop,
-    })
-}
-
-/// Splits configurations that stand one after the other.
-#[must_use]
-pub fn split(configurations: &[f64], joint_count: usize) -> Vec<Vec<f64>> {
-    configurations.chunks_exact(joint_count).map(<[f64]>::to_vec).collect()
+    Ok(Found { configurations: swarm_best, value: swarm_value, stop })
 }
 
 /// The particle with the highest best-known fitness, the first of equals.
 fn leader_of(particles: &[Particle]) -> usize {
-    (1..particles.len()).fold(0, |leader, particle| {
-        if particles[particle].best.comprehensive > particles[leader].best.comprehensive { particle } else { leader }
-    })
+    (1..particles.len()).fold(
+        0,
+        |leader, particle| {
+            if particles[particle].best > particles[leader].best { particle } else { leader }
+        },
+    )
 }
 
 impl Particle {
-    fn evaluate(&mut self, evaluator: &Evaluator) {
-        self.indexes = evaluator.evaluate(&self.position, &mut self.scratch);
+    fn evaluate(&mut self, task: &Task<'_>) {
+        self.value = task.value(&self.position, &mut self.scratch);
         self.end_points.clear();
-        let ends = evaluator.end_points(&self.scratch);
+        let ends = self.scratch.objective.end_points();
         self.end_points.extend(ends.iter().map(|point| [point.x as f32, point.y as f32, point.z as f32]));
     }
 
-    /// Eq. 36 with the limits and the collisions.
-    fn step(&mut self, arm: &Arm, check: &CollisionCheck, inertia: f64, pull: (f64, f64), swarm_best: &[f64], factor: f64) {
-        let joints = &arm.chain.joints;
+    /// Eq. 36 with the limits and the rules.
+    fn step(&mut self, task: &Task<'_>, inertia: f64, pull: (f64, f64), swarm_best: &[f64], factor: f64) {
+        let joints = &task.arm().chain.joints;
         let mut moved = false;
         let mut candidate = vec![0.0; joints.len()];
         for start in (0..self.position.len()).step_by(joints.len()) {
@@ -197,8 +152,7 @@ impl Particle {
                 candidate[offset] = (position + factor * self.velocity[at]).clamp(joint.lower, joint.upper);
             }
             let range = start..start + joints.len();
-            if check.collides(&candidate, &mut self.collision_scratch) {
-                self.rejections += 1;
+            if task.refuses(&candidate, &mut self.scratch) {
                 self.velocity[range].fill(0.0);
                 // It did not move, but the pull may still move it.
                 moved = true;
@@ -214,70 +168,56 @@ impl Particle {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::SceneFile;
+    use crate::design::candidates::Rules;
+    use crate::design::objective::{Models, Objective};
+    use crate::scene::{Criterion, SceneFile};
     use crate::seed::stream;
 
     fn cell() -> SceneFile {
         crate::scene::read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml")).unwrap()
     }
 
-    fn optimise_cell(threads: usize) -> (Optimum, Vec<SwarmIteration>) {
+    /// What a small swarm finds and tells, with its evaluations and rejections.
+    fn swarm() -> (Found, Vec<SwarmIteration>, [u64; 2]) {
         let file = cell();
         let scene = &file.scene;
-        let evaluator = Evaluator::new(
-            &scene.arm,
-            true,
-            scene.design.evenness_domain,
-            scene.design.evenness_step_m,
-            scene.design.jacobian_scaling,
-        );
-        let check = CollisionCheck::new(&scene.arm);
+        let models = Models::new(scene).unwrap();
+        let objective = Objective::new(&models, Criterion::Comprehensive, scene.arm.joint_count());
+        let rules = Rules::measurable(&scene.arm, &scene.sensor);
+        let task = Task::new(&rules, &objective, 10, u64::MAX, 1);
         let settings = Swarm { particles: 6, iterations: 15, ..scene.design.swarm.clone() };
         let mut told = Vec::new();
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let optimum = pool
-            .install(|| {
-                let watch = |iteration: &SwarmIteration| {
-                    told.push(iteration.clone());
-                    Ok::<(), std::convert::Infallible>(())
-                };
-                optimise(&scene.arm, &evaluator, &check, 10, &settings, &mut stream(5, "test/swarm"), watch)
-            })
-            .unwrap();
-        (optimum, told)
-    }
-
-    #[test]
-    fn the_outcome_does_not_depend_on_the_number_of_threads() {
-        let (one, told_one) = optimise_cell(1);
-        let (two, told_two) = optimise_cell(2);
-        assert_eq!(one.configurations, two.configurations);
-        assert_eq!(told_one, told_two);
+        let mut watch = |step: Told| {
+            let Told::Swarm(iteration) = step else { panic!("a swarm tells iterations") };
+            told.push(iteration);
+            Ok(())
+        };
+        let found = search(&task, &settings, &mut stream(5, "test/swarm"), &mut watch).unwrap();
+        (found, told, [task.evaluations(), task.rejections()])
     }
 
     #[test]
     fn no_best_ever_collides_or_leaves_the_limits_and_the_swarm_only_gets_better() {
-        let (optimum, told) = optimise_cell(2);
-        let arm = cell().scene.arm;
-        let check = CollisionCheck::new(&arm);
-        let mut scratch = self_collision::Scratch::default();
+        let (found, told, [evaluations, rejections]) = swarm();
+        let scene = cell().scene;
+        let rules = Rules::measurable(&scene.arm, &scene.sensor);
         let mut bests = 0;
         for joints in told.iter().flat_map(|iteration| &iteration.best_configurations) {
-            assert!(arm.within_limits(joints) && !check.collides(joints, &mut scratch), "{joints:?}");
+            assert!(scene.arm.within_limits(joints) && !rules.refuses(joints, &mut Default::default()), "{joints:?}");
             bests += 1;
         }
         assert!(bests >= 10);
         assert!(told.windows(2).all(|pair| pair[1].best.comprehensive >= pair[0].best.comprehensive));
-        assert_eq!(optimum.evaluations, 6 * 16);
-        assert!(optimum.rejections > 0, "collisions bind in this cell");
+        assert_eq!(evaluations, 6 * 16);
+        assert!(rejections > 0, "collisions bind in this cell");
         let last = told.last().unwrap();
-        assert_eq!((last.rejections, last.evaluations), (optimum.rejections, optimum.evaluations));
-        assert_eq!(last.best.comprehensive, optimum.indexes.comprehensive);
+        assert_eq!([last.evaluations, last.rejections], [evaluations, rejections]);
+        assert_eq!(last.best.comprehensive, found.value);
     }
 
     #[test]
     fn inertia_and_factors_follow_equations_37_and_38() {
-        let (_, told) = optimise_cell(1);
+        let (_, told, _) = swarm();
         let last = told.last().unwrap();
         assert_eq!(last.inertia, 0.4);
         let before = &told[told.len() - 2];

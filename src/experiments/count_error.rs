@@ -6,13 +6,12 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::cell::measure;
 use crate::cell::measure::plan;
-use crate::design::candidates::Sampler;
-use crate::design::swarm::split;
+use crate::design::candidates::{Rules, Sampler};
+use crate::design::search::split;
 use crate::identification::identify;
 use crate::recording::event::Nobody;
 use crate::scene::{Injected, Scene};
 use crate::seed::{derive, stream};
-use crate::self_collision::CollisionCheck;
 use crate::session::SessionError;
 
 const PUBLISHED: &str = include_str!("../../tests/reference/chen2019-table4.toml");
@@ -99,9 +98,8 @@ pub fn run(scene: &Scene, injected: &Injected, trials: usize, done: &(dyn Fn() +
 fn one(scene: &Scene, injected: &Injected, count: usize, trial: usize) -> Result<Option<[f64; 3]>, SessionError> {
     let mut scene = scene.clone();
     scene.seed = derive(scene.seed, trial as u64);
-    let check = CollisionCheck::new(&scene.arm);
-    let mut sampler = Sampler::new(&scene.arm, &check);
-    let chosen = sampler.draw(&mut stream(scene.seed, &format!("count_error/{count}")), count)?;
+    let rules = Rules::measurable(&scene.arm, &scene.sensor);
+    let chosen = Sampler::new(&rules).draw(&mut stream(scene.seed, &format!("count_error/{count}")), count)?;
     let held_out = crate::design::held_out(&scene)?;
     let planned = plan(&scene, &split(&chosen, scene.arm.joint_count()), &held_out);
     let (measurements, _) = measure(&scene, injected, &planned, planned.len(), &mut Nobody)?;

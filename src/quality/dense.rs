@@ -3,11 +3,27 @@
 
 /// Adds `factor · rowsᵀ rows` to the lower triangle of the row-major `n × n` matrix `gram`; `rows` has `n` columns.
 pub fn add_gram(rows: &[f64], factor: f64, n: usize, gram: &mut [f64]) {
-    for row in rows.chunks_exact(n) {
+    if rows.len() == 6 * n {
+        let (r0, rest) = rows.split_at(n);
+        let (r1, rest) = rest.split_at(n);
+        let (r2, rest) = rest.split_at(n);
+        let (r3, rest) = rest.split_at(n);
+        let (r4, r5) = rest.split_at(n);
         for i in 0..n {
-            let weight = factor * row[i];
-            for (sum, value) in gram[i * n..=i * n + i].iter_mut().zip(row) {
-                *sum += weight * value;
+            let [c0, c1, c2, c3, c4, c5] = [r0[i], r1[i], r2[i], r3[i], r4[i], r5[i]].map(|value| factor * value);
+            let target = &mut gram[i * n..=i * n + i];
+            let sources = r0.iter().zip(r1).zip(r2).zip(r3).zip(r4).zip(r5);
+            for (sum, (((((a0, a1), a2), a3), a4), a5)) in target.iter_mut().zip(sources) {
+                *sum += ((c0 * a0 + c1 * a1) + (c2 * a2 + c3 * a3)) + (c4 * a4 + c5 * a5);
+            }
+        }
+    } else {
+        for row in rows.chunks_exact(n) {
+            for i in 0..n {
+                let weight = factor * row[i];
+                for (sum, value) in gram[i * n..=i * n + i].iter_mut().zip(row) {
+                    *sum += weight * value;
+                }
             }
         }
     }
@@ -86,6 +102,21 @@ pub fn inverse(lower: &[f64], n: usize) -> Vec<f64> {
         }
     }
     inverse
+}
+
+/// Copies the lower triangle of the row-major `n × n` matrix to the upper.
+pub fn mirror(matrix: &mut [f64], n: usize) {
+    for i in 0..n {
+        for j in 0..i {
+            matrix[j * n + i] = matrix[i * n + j];
+        }
+    }
+}
+
+/// `vᵀ A v` for the symmetric matrix `a`, both triangles given.
+#[must_use]
+pub fn quadratic(a: &[f64], v: &[f64]) -> f64 {
+    a.chunks_exact(v.len()).zip(v).map(|(row, value)| value * dot(row, v)).sum()
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, Vector3};
 
 use super::Indexes;
+use super::dense;
 use super::globality::{WorkspaceGrid, dispersion};
 use super::observability::observability;
 use super::subspace::Subspace;
@@ -11,7 +12,6 @@ use crate::kinematics::ChainAt;
 use crate::scene::{EvennessDomain, JacobianScaling};
 
 /// Evaluates sets of configurations of one arm at its nominal parameters.
-///
 pub struct Evaluator {
     chain: ChainAt,
     subspace: Subspace,
@@ -80,11 +80,36 @@ impl Evaluator {
         &scratch.end_points
     }
 
-    fn indexes(&self, mut squares: Vec<f64>, count: usize, end_points: &[Vector3<f64>]) -> Indexes {
-        squares.sort_unstable_by(|a, b| b.total_cmp(a));
-        // Below this share of the largest, an eigenvalue of JᵀJ is rounding.
-        let floor = squares.first().copied().unwrap_or(0.0) * squares.len() as f64 * f64::EPSILON;
-        let values: Vec<f64> = squares[..count].iter().map(|square| if *square > floor { square.sqrt() } else { 0.0 }).collect();
+    /// Numbers that [`Evaluator::rows_into`] writes.
+    #[must_use]
+    pub fn row_size(&self) -> usize {
+        self.rows_per_pose * self.parameter_count()
+    }
+
+    /// Number of parameters: columns of the Jacobian.
+    #[must_use]
+    pub fn parameter_count(&self) -> usize {
+        self.chain.parameter_count()
+    }
+
+    /// Writes the error Jacobian of `joints` (`rows_per_pose × parameters`, row-major; m, rad) to `rows`; the end point in base, m.
+    pub fn rows_into(&self, joints: &[f64], scratch: &mut Vec<f64>, rows: &mut [f64]) -> Vector3<f64> {
+        let n = self.parameter_count();
+        scratch.resize(6 * n, 0.0);
+        let (_, end_point) = self.chain.jacobian_into(joints, scratch, n);
+        rows.copy_from_slice(&scratch[..rows.len()]);
+        end_point
+    }
+
+    /// The singular values that count, largest first: as many as the arm's structure has independent parameters; zeros where the
+    /// set shows fewer. `gram` is the lower triangle of JᵀJ (unscaled) of the stacked Jacobian of `poses` configurations.
+    #[must_use]
+    pub fn singular_values(&self, gram: &[f64], poses: usize) -> Vec<f64> {
+        nonzero(self.eigenvalues(gram, poses), self.subspace.rank())
+    }
+
+    fn indexes(&self, squares: Vec<f64>, count: usize, end_points: &[Vector3<f64>]) -> Indexes {
+        let values = nonzero(squares, count);
         let o = observability(&values);
         let (d, u) = (dispersion(end_points), self.grid.evenness(end_points));
         Indexes {
@@ -111,13 +136,18 @@ impl Evaluator {
         for joints in configurations.chunks_exact(self.joint_count) {
             let (_, end_point) = self.chain.jacobian_into(joints, &mut scratch.rows, n);
             scratch.end_points.push(end_point);
-            accumulate(&scratch.rows[..self.rows_per_pose * n], n, &mut scratch.gram);
+            dense::add_gram(&scratch.rows[..self.rows_per_pose * n], 1.0, n, &mut scratch.gram);
         }
-        let entry = |row: usize, column: usize| scratch.gram[row.max(column) * n + row.min(column)];
+        self.eigenvalues(&scratch.gram, scratch.end_points.len())
+    }
+
+    fn eigenvalues(&self, gram: &[f64], poses: usize) -> Vec<f64> {
+        let n = self.parameter_count();
+        let entry = |row: usize, column: usize| gram[row.max(column) * n + row.min(column)];
         let gram = match self.scaling {
             JacobianScaling::Si => DMatrix::from_fn(n, n, entry),
             JacobianScaling::PerPose => {
-                let share = 1.0 / scratch.end_points.len().max(1) as f64;
+                let share = 1.0 / poses.max(1) as f64;
                 DMatrix::from_fn(n, n, |row, column| share * entry(row, column))
             }
             JacobianScaling::Columns => {
@@ -134,31 +164,12 @@ impl Evaluator {
     }
 }
 
-/// Adds `rowsᵀ rows` to the lower triangle of `gram` (row-major n × n).
-fn accumulate(rows: &[f64], n: usize, gram: &mut [f64]) {
-    if rows.len() == 6 * n {
-        let (r0, rest) = rows.split_at(n);
-        let (r1, rest) = rest.split_at(n);
-        let (r2, rest) = rest.split_at(n);
-        let (r3, rest) = rest.split_at(n);
-        let (r4, r5) = rest.split_at(n);
-        for i in 0..n {
-            let (c0, c1, c2, c3, c4, c5) = (r0[i], r1[i], r2[i], r3[i], r4[i], r5[i]);
-            let target = &mut gram[i * n..i * n + i + 1];
-            let sources = r0.iter().zip(r1).zip(r2).zip(r3).zip(r4).zip(r5);
-            for (sum, (((((a0, a1), a2), a3), a4), a5)) in target.iter_mut().zip(sources) {
-                *sum += ((c0 * a0 + c1 * a1) + (c2 * a2 + c3 * a3)) + (c4 * a4 + c5 * a5);
-            }
-        }
-    } else {
-        for row in rows.chunks_exact(n) {
-            for i in 0..n {
-                for (sum, value) in gram[i * n..i * n + i + 1].iter_mut().zip(row) {
-                    *sum += row[i] * value;
-                }
-            }
-        }
-    }
+/// Roots of the `count` largest of the eigenvalues `squares`, zero where these are rounding.
+fn nonzero(mut squares: Vec<f64>, count: usize) -> Vec<f64> {
+    squares.sort_unstable_by(|a, b| b.total_cmp(a));
+    // Below this share of the largest, an eigenvalue of JᵀJ is rounding.
+    let floor = squares.first().copied().unwrap_or(0.0) * squares.len() as f64 * f64::EPSILON;
+    squares[..count].iter().map(|square| if *square > floor { square.sqrt() } else { 0.0 }).collect()
 }
 
 /// Comprehensive quality index O_C (eq. 27): at most 5.

@@ -5,6 +5,7 @@ pub mod evaluator;
 pub mod globality;
 pub mod information;
 pub mod observability;
+pub mod prediction;
 pub mod subspace;
 
 use serde::{Deserialize, Serialize};

@@ -104,6 +104,7 @@ impl Encoder {
         match event {
             Event::Start(start) => self.start(start, &mut messages)?,
             Event::Swarm(swarm) => self.swarm(swarm, &mut messages)?,
+            Event::Search(_) => {}
             Event::Designed(outcome) => self.designed(outcome, &mut messages)?,
             Event::Measured(measurement) => self.measured(measurement, &mut messages)?,
             Event::Identified(identification) => self.identified(identification, &mut messages)?,
@@ -125,7 +126,7 @@ impl Encoder {
     fn advance(&mut self, event: &Event) {
         let next = self.now_ns.saturating_add(STEP_NS);
         match event {
-            Event::Swarm(_) | Event::Identified(_) => self.now_ns = next,
+            Event::Swarm(_) | Event::Search(_) | Event::Identified(_) => self.now_ns = next,
             Event::Designed(_) => {
                 self.now_ns = next;
                 self.session_start_ns = None;

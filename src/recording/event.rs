@@ -1,6 +1,6 @@
 //! What happens in a run, in order. Live views, the recording and its replay all see this one type.
 
-use crate::design::outcome::{DesignOutcome, SwarmIteration};
+use crate::design::outcome::{DesignOutcome, SearchStep, SwarmIteration};
 use crate::identification::outcome::Identification;
 use crate::measurement::Measurement;
 
@@ -11,6 +11,8 @@ pub enum Event {
     Start(Start),
     /// An iteration of the swarm.
     Swarm(SwarmIteration),
+    /// A step of a search by any other method.
+    Search(SearchStep),
     /// The configurations have been chosen.
     Designed(DesignOutcome),
     /// A configuration has been measured.

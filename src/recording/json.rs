@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::design::outcome::{DesignOutcome, EvennessDomains, RandomReference, StopReason, SwarmIteration};
+use crate::design::outcome::{Advice, DesignOutcome, EvennessDomains, RandomReference, StopReason, SwarmIteration};
 use crate::quality::Indexes;
 
 /// A configuration as an object: Foxglove shows no arrays of arrays.
@@ -79,6 +79,9 @@ impl From<Swarm> for SwarmIteration {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Design {
     method: String,
+    criterion: String,
+    value: f64,
+    advice: Option<Advice>,
     configurations: Vec<Configuration>,
     indexes: Indexes,
     indexes_all_parameters: Indexes,
@@ -94,6 +97,9 @@ impl From<&DesignOutcome> for Design {
     fn from(outcome: &DesignOutcome) -> Self {
         Design {
             method: outcome.method.clone(),
+            criterion: outcome.criterion.clone(),
+            value: outcome.value,
+            advice: outcome.advice,
             configurations: wrap(&outcome.configurations),
             indexes: outcome.indexes,
             indexes_all_parameters: outcome.indexes_all_parameters,
@@ -111,6 +117,9 @@ impl From<Design> for DesignOutcome {
     fn from(design: Design) -> Self {
         DesignOutcome {
             method: design.method,
+            criterion: design.criterion,
+            value: design.value,
+            advice: design.advice,
             configurations: unwrap(design.configurations),
             indexes: design.indexes,
             indexes_all_parameters: design.indexes_all_parameters,

@@ -161,7 +161,7 @@ impl Recorder {
             self.with_writer(|writer| writer.write_metadata(&Metadata { name: "kincal".to_owned(), metadata }))?;
         }
         match event {
-            Event::Swarm(_) => self.swarm_since_flush += 1,
+            Event::Swarm(_) | Event::Search(_) => self.swarm_since_flush += 1,
             Event::Measured(_) => self.measurements_since_flush += 1,
             _ => {}
         }

@@ -90,6 +90,8 @@ fn stop(reason: StopReason) -> &'static str {
         StopReason::IterationLimit => "all iterations made",
         StopReason::Converged => "no particle moved any more",
         StopReason::Drawn => "drawn once",
+        StopReason::BudgetSpent => "budget spent",
+        StopReason::LocalOptimum => "no change makes it better",
     }
 }
 

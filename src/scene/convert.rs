@@ -5,8 +5,8 @@ use nalgebra::{Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use super::error::{Invalid, suggestion};
 use super::file::*;
 use super::{
-    DesignProblem, EvennessDomain, Injected, JacobianScaling, JointClearance, Method, Noise, Plan, Scene, Swarm, Thermal,
-    ThermalProfile, Weights,
+    DesignProblem, EvennessDomain, Injected, JacobianScaling, JointClearance, Noise, Plan, Scene, Swarm, Thermal, ThermalProfile,
+    Weights,
 };
 use crate::arm::{Arm, Fixture, Geometry, Inertial, Link, Shape};
 use crate::frames::Pose;
@@ -430,10 +430,15 @@ fn design(file: &DesignToml, arm: &Arm, sensor: &Sensor) -> Checked<DesignProble
     }
     Ok(DesignProblem {
         count: count(file.count, 10_000, "design.count", "measure fewer configurations")?,
-        method: match file.method {
-            MethodToml::Pso => Method::Pso,
-            MethodToml::Random => Method::Random,
-        },
+        method: file.method,
+        criterion: file.criterion,
+        budget: count(
+            usize::try_from(file.budget).unwrap_or(usize::MAX),
+            1_000_000_000,
+            "design.budget",
+            "or use method = \"random\"",
+        )? as u64,
+        pool: count(file.pool, 100_000, "design.pool", "give the search candidates")?,
         swarm: Swarm {
             particles: count(swarm.particles, 1000, "design.swarm.particles", "give the swarm particles")?,
             iterations: count(swarm.iterations, 1_000_000, "design.swarm.iterations", "or use method = \"random\"")?,

@@ -10,6 +10,8 @@ use std::fmt;
 use serde::de::{self, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::{Criterion, Method};
+
 /// The whole file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -280,9 +282,18 @@ pub struct SensorToml {
 pub struct DesignToml {
     /// m: configurations that are measured and fitted; at least what eq. 30 asks for.
     pub count: usize,
-    /// Default: pso.
+    /// Default: coordinate_exchange.
     #[serde(default)]
-    pub method: MethodToml,
+    pub method: Method,
+    /// What the method makes large. Default: i_optimality.
+    #[serde(default)]
+    pub criterion: Criterion,
+    /// Values of the criterion after which a method stops at the latest (`pso` makes its iterations instead). Default: 20000.
+    #[serde(default = "budget")]
+    pub budget: u64,
+    /// Random candidates of `detmax` and `perturbation`, and of the bound that no choice can beat. Default: 1000.
+    #[serde(default = "pool")]
+    pub pool: usize,
     /// Which points count as workspace in eq. 25. Default: reachable.
     #[serde(default)]
     pub evenness_domain: EvennessDomainToml,
@@ -304,19 +315,16 @@ fn evenness_step_mm() -> f64 {
     100.0
 }
 
-fn random_sets() -> usize {
-    30
+fn budget() -> u64 {
+    20_000
 }
 
-/// How configurations are chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum MethodToml {
-    /// Particle swarm on O_C.
-    #[default]
-    Pso,
-    /// Uniform within the limits.
-    Random,
+fn pool() -> usize {
+    1000
+}
+
+fn random_sets() -> usize {
+    30
 }
 
 /// Which points count as workspace.

@@ -7,9 +7,9 @@ use serde::de::DeserializeOwned;
 
 use super::convert;
 use super::error::{Invalid, Located, Problem, SceneError, in_our_words};
-use super::file::{InjectedOnlyToml, MethodToml, SceneToml, WeightsToml};
+use super::file::{InjectedOnlyToml, SceneToml, WeightsToml};
 use super::magnitude::too_large;
-use super::{Injected, Scene};
+use super::{Injected, Method, Scene};
 use crate::arm::Arm;
 
 /// A scene as read: validated, with the file's own values kept for writing them again.
@@ -134,7 +134,7 @@ impl SceneFile {
     ///
     /// # Errors
     /// None today; as the others.
-    pub fn set_method(&mut self, method: MethodToml) -> Result<(), SceneError> {
+    pub fn set_method(&mut self, method: Method) -> Result<(), SceneError> {
         self.change("design.method", &method, |toml| toml.design.method = method)
     }
 

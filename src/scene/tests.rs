@@ -210,7 +210,7 @@ fn overrides_are_validated_and_written() {
     file.set_seed(7).expect("allowed");
     file.set_count(12).expect("allowed");
     file.set_held_out_count(3).expect("allowed");
-    file.set_method(file::MethodToml::Random).expect("allowed");
+    file.set_method(super::Method::Random).expect("allowed");
     file.set_weights(file::WeightsToml::Unit).expect("allowed");
     file.set_injected_seed("99").expect("allowed");
     file.set("design.swarm.particles", "5").expect("allowed");

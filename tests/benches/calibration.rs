@@ -3,13 +3,15 @@
 use divan::{Bencher, black_box};
 use kincal::cell::measure;
 use kincal::cell::measure::plan;
-use kincal::design::candidates::Sampler;
-use kincal::design::swarm::{optimise, split};
+use kincal::design::candidates::{Rules, Sampler};
+use kincal::design::objective::{Models, Objective};
+use kincal::design::search::{Task, Told, split};
+use kincal::design::swarm;
 use kincal::identification::identify;
 use kincal::measurement::Measurement;
 use kincal::quality::evaluator::{Evaluator, Scratch};
 use kincal::recording::event::Nobody;
-use kincal::scene::SceneFile;
+use kincal::scene::{Criterion, SceneFile};
 use kincal::seed::stream;
 use kincal::self_collision::{self, CollisionCheck};
 
@@ -32,7 +34,7 @@ fn comprehensive_index(bencher: Bencher, name: &str) {
     let file = scene(name);
     let evaluator = evaluator(&file);
     let check = CollisionCheck::new(&file.scene.arm);
-    let sets = sets(&file, &check, 20);
+    let sets = sets(&file, 20);
     let (mut scratch, mut collision_scratch) = (Scratch::default(), self_collision::Scratch::default());
     let mut next = sets.iter().cycle();
     bencher.bench_local(|| {
@@ -47,7 +49,7 @@ fn comprehensive_index(bencher: Bencher, name: &str) {
 fn collision_checks(bencher: Bencher) {
     let file = scene("arm8.toml");
     let check = CollisionCheck::new(&file.scene.arm);
-    let sets = sets(&file, &check, 1);
+    let sets = sets(&file, 1);
     let mut scratch = self_collision::Scratch::default();
     bencher.bench_local(|| sets[0].chunks_exact(8).filter(|joints| check.collides(joints, &mut scratch)).count());
 }
@@ -57,12 +59,12 @@ fn collision_checks(bencher: Bencher) {
 fn swarm(bencher: Bencher, name: &str) {
     let file = scene(name);
     let scene = &file.scene;
-    let evaluator = evaluator(&file);
-    let check = CollisionCheck::new(&scene.arm);
+    let models = Models::new(scene).expect("free configurations");
+    let objective = Objective::new(&models, Criterion::Comprehensive, scene.arm.joint_count());
+    let rules = Rules::measurable(&scene.arm, &scene.sensor);
     bencher.bench_local(|| {
-        let mut stream = stream(1, "bench/swarm");
-        let watch = |_: &_| Ok::<(), std::convert::Infallible>(());
-        optimise(&scene.arm, &evaluator, &check, 40, &scene.design.swarm, &mut stream, watch).map(|optimum| optimum.indexes)
+        let task = Task::new(&rules, &objective, 40, scene.design.swarm.evaluations(), 1);
+        swarm::search(&task, &scene.design.swarm, &mut stream(1, "bench/swarm"), &mut |_: Told| Ok(())).map(|found| found.value)
     });
 }
 
@@ -75,15 +77,16 @@ fn identification(bencher: Bencher, name: &str) {
     bencher.bench_local(|| identify(&scene.arm, &scene.sensor, scene.weights, black_box(&measurements)));
 }
 
-fn sets(file: &SceneFile, check: &CollisionCheck, count: usize) -> Vec<Vec<f64>> {
+fn sets(file: &SceneFile, count: usize) -> Vec<Vec<f64>> {
     let mut stream = stream(1, "bench/sets");
-    let mut sampler = Sampler::new(&file.scene.arm, check);
+    let rules = Rules::reachable(&file.scene.arm);
+    let mut sampler = Sampler::new(&rules);
     (0..count).map(|_| sampler.draw(&mut stream, 40).expect("free configurations")).collect()
 }
 
 fn measurements(file: &SceneFile, count: usize) -> Vec<Measurement> {
-    let check = CollisionCheck::new(&file.scene.arm);
-    let mut sampler = Sampler::new(&file.scene.arm, &check);
+    let rules = Rules::reachable(&file.scene.arm);
+    let mut sampler = Sampler::new(&rules);
     let chosen = sampler.draw(&mut stream(1, "bench/poses"), count).expect("free configurations");
     let planned = plan(&file.scene, &split(&chosen, 8), &[]);
     let injected = file.injected.as_ref().expect("a scene to simulate");

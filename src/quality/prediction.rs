@@ -1,0 +1,138 @@
+//! How well the calibrated model will predict the pose over the workspace: the variance that the readings' noise leaves.
+//!
+//! With information M of a set on the identifiable parameters, the pose at a configuration with error Jacobian P is predicted with
+//! covariance P M⁻¹ Pᵀ. Its mean over the workspace is what I-optimality (also V- or Q-optimality) makes small, its largest value
+//! what G-optimality makes small (Atkinson, Donev and Tobias 2007, chapter 10).
+
+use serde::{Deserialize, Serialize};
+
+use super::dense;
+use super::information::{InformationModel, JacobianScratch};
+
+/// Configurations of the sample at which the worst point is looked for.
+const WORST_POINTS: usize = 200;
+
+/// The workspace as a sample of configurations, prepared for one arm and what is identified of it.
+#[derive(Clone, Debug)]
+pub struct PredictionWorkspace {
+    rank: usize,
+    /// Mean of PᵀP over the sample, position rows (m² per unit of covariance): row-major `rank × rank`.
+    position: Vec<f64>,
+    /// The same for the attitude rows (rad²).
+    attitude: Vec<f64>,
+    /// Position rows of the first points, 3 × rank each.
+    points: Vec<f64>,
+}
+
+/// What is expected of a calibrated model that has no error but what noise left in it.
+#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize)]
+pub struct Prediction {
+    /// Root of the mean squared position error over the workspace (3-D), m: the root of the I-criterion.
+    pub position_rms_m: f64,
+    /// Root of the mean squared attitude error (rotation vector), rad.
+    pub attitude_rms_rad: f64,
+    /// Root of the largest mean squared position error at a point of the workspace, m: the root of the G-criterion.
+    pub position_worst_m: f64,
+}
+
+impl PredictionWorkspace {
+    /// The workspace told by `configurations` (one after the other, rad or m).
+    #[must_use]
+    pub fn new(model: &InformationModel, configurations: &[f64], joint_count: usize) -> Self {
+        let rank = model.rank();
+        let mut rows = vec![0.0; 6 * rank];
+        let mut scratch = JacobianScratch::default();
+        let (mut position, mut attitude) = (vec![0.0; rank * rank], vec![0.0; rank * rank]);
+        let mut points = Vec::new();
+        let share = joint_count as f64 / configurations.len().max(1) as f64;
+        for (index, joints) in configurations.chunks_exact(joint_count).enumerate() {
+            model.unscaled_into(joints, &mut scratch, &mut rows);
+            dense::add_gram(&rows[..3 * rank], share, rank, &mut position);
+            dense::add_gram(&rows[3 * rank..], share, rank, &mut attitude);
+            if index < WORST_POINTS {
+                points.extend_from_slice(&rows[..3 * rank]);
+            }
+        }
+        dense::mirror(&mut position, rank);
+        dense::mirror(&mut attitude, rank);
+        PredictionWorkspace { rank, position, attitude, points }
+    }
+
+    /// L of the I-criterion tr(L M⁻¹): mean of PᵀP over the workspace, position rows; row-major `rank × rank`, both triangles.
+    #[must_use]
+    pub fn position_matrix(&self) -> &[f64] {
+        &self.position
+    }
+
+    /// I-criterion: mean variance of the predicted position over the workspace (trace over the axes), m²; from the Cholesky
+    /// factor of the information.
+    #[must_use]
+    pub fn mean_variance(&self, factor: &[f64]) -> f64 {
+        dense::dot(&self.position, &dense::inverse(factor, self.rank))
+    }
+
+    /// G-criterion: largest variance of the predicted position at a point of the workspace, m².
+    #[must_use]
+    pub fn worst_variance(&self, factor: &[f64]) -> f64 {
+        let inverse = dense::inverse(factor, self.rank);
+        let variance = |rows: &[f64]| rows.chunks_exact(self.rank).map(|row| dense::quadratic(&inverse, row)).sum::<f64>();
+        self.points.chunks_exact(3 * self.rank).map(variance).fold(0.0, f64::max)
+    }
+
+    /// What a set with this information (lower triangle, row-major) lets expect; `None` where it does not determine the parameters.
+    #[must_use]
+    pub fn predict(&self, information: &[f64]) -> Option<Prediction> {
+        let mut factor = information.to_vec();
+        dense::cholesky(&mut factor, self.rank).then(|| {
+            let inverse = dense::inverse(&factor, self.rank);
+            Prediction {
+                position_rms_m: dense::dot(&self.position, &inverse).max(0.0).sqrt(),
+                attitude_rms_rad: dense::dot(&self.attitude, &inverse).max(0.0).sqrt(),
+                position_worst_m: self.worst_variance(&factor).max(0.0).sqrt(),
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::quality::information::Blocks;
+    use crate::seed::stream;
+
+    #[test]
+    fn variances_are_those_of_the_covariance() {
+        let scene = crate::scene::read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml")).unwrap().scene;
+        let model = InformationModel::new(&scene.arm, &scene.sensor, scene.weights);
+        let rank = model.rank();
+        let mut stream = stream(4, "test/prediction");
+        let mut draw = |count: usize| -> Vec<f64> {
+            (0..count).flat_map(|_| &scene.arm.chain.joints).map(|joint| stream.uniform(joint.lower, joint.upper)).collect()
+        };
+        let (set, points) = (draw(20), draw(30));
+        let blocks = Blocks::of(&model, &set, 8);
+        let mut information = vec![0.0; rank * rank];
+        blocks.iter().for_each(|block| dense::add_gram(block, 1.0, rank, &mut information));
+        let workspace = PredictionWorkspace::new(&model, &points, 8);
+        let prediction = workspace.predict(&information).unwrap();
+
+        let stacked = DMatrix::from_row_iterator(blocks.len() * 6, rank, blocks.iter().flatten().copied());
+        let covariance = (stacked.transpose() * stacked).try_inverse().unwrap();
+        let mut traces = Vec::new();
+        let mut rows = vec![0.0; 6 * rank];
+        for joints in points.chunks_exact(8) {
+            model.unscaled_into(joints, &mut JacobianScratch::default(), &mut rows);
+            let p = DMatrix::from_row_slice(6, rank, &rows);
+            let variance = &p * &covariance * p.transpose();
+            traces.push((variance.view((0, 0), (3, 3)).trace(), variance.view((3, 3), (3, 3)).trace()));
+        }
+        let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / 30.0;
+        let close = |a: f64, b: f64| assert!((a / b.sqrt() - 1.0).abs() < 1e-7, "{a} is not {}", b.sqrt());
+        close(prediction.position_rms_m, mean(&mut traces.iter().map(|trace| trace.0)));
+        close(prediction.attitude_rms_rad, mean(&mut traces.iter().map(|trace| trace.1)));
+        close(prediction.position_worst_m, traces.iter().map(|trace| trace.0).fold(0.0, f64::max));
+        assert!(workspace.predict(&vec![0.0; rank * rank]).is_none());
+    }
+}
