@@ -26,6 +26,9 @@ pub enum SessionError {
     /// Measuring.
     #[error(transparent)]
     Measure(#[from] MeasureError),
+    /// Nothing that could verify a calibration was measured.
+    #[error("nothing is held out: set plan.held_out_count = 1 or more")]
+    NothingHeldOut,
     /// Identifying.
     #[error(transparent)]
     Identification(#[from] IdentificationError),

@@ -1,3 +1,5 @@
 //! Experiments that know the truth and the answer: the only place that holds both.
 
 pub mod count_error;
+pub mod statistics;
+pub mod trial;

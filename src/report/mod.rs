@@ -225,7 +225,7 @@ pub fn number(value: f64) -> String {
 /// Table 4 of the paper beside ours.
 #[must_use]
 pub fn count_error(rows: &[crate::experiments::count_error::Row]) -> String {
-    use crate::experiments::count_error::Mean;
+    use crate::experiments::statistics::Mean;
     let value = |mean: &Option<Mean>, factor: f64| mean.map_or_else(|| "–".to_owned(), |mean| number(mean.mean * factor));
     let interval = |mean: &Option<Mean>, factor: f64| match mean.and_then(|mean| mean.interval95) {
         Some([low, high]) => format!("{} … {}", number(low * factor), number(high * factor)),
