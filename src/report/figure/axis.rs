@@ -228,7 +228,12 @@ impl<'a> Ruler<'a> {
 fn linear([low, high]: [f64; 2], about: usize) -> Vec<(f64, f64)> {
     let rough = (high - low) / about.max(2) as f64;
     let power = libm::exp10(libm::floor(libm::log10(rough)));
-    let factor = [1.0, 2.0, 5.0].into_iter().find(|factor| factor * power >= rough * 0.999).unwrap_or(10.0);
+    let factor = match rough / power {
+        ..1.5 => 1.0,
+        ..3.5 => 2.0,
+        ..7.5 => 5.0,
+        _ => 10.0,
+    };
     let step = factor * power;
     if !(step.is_finite() && step > 0.0) {
         return Vec::new();

@@ -26,7 +26,6 @@ const LEADING: f64 = 1.3;
 const MARGIN: f64 = 12.0;
 const GAP: f64 = 16.0;
 const TICK: f64 = 4.0;
-const SWATCH: f64 = 22.0;
 const RADIUS: f64 = 3.2;
 const CELL: [f64; 2] = [58.0, 26.0];
 
@@ -80,6 +79,15 @@ impl Pen {
 
     fn upwards(&mut self, text: &str, at: [f64; 2], size: f64, anchor: Anchor) {
         self.shapes.push(Shape::Text { text: text.to_owned(), at, size, anchor, upwards: true, colour: TEXT });
+    }
+
+    /// A text among data, on a background that lets it be read.
+    fn noted(&mut self, text: &str, at: [f64; 2], anchor: Anchor) {
+        let width = self.face.width(text, SMALL);
+        let left = if anchor == Anchor::End { at[0] - width } else { at[0] };
+        let rect = Rect { x: [left - 2.0, left + width + 2.0], y: [at[1] - 0.6 * SMALL, at[1] + 0.6 * SMALL] };
+        self.area(rect.corners(), WHITE, 0.8);
+        self.text(text, at, SMALL, anchor);
     }
 
     /// Lines below each other; `at` is the middle of the upper edge.
@@ -190,6 +198,15 @@ impl Kind {
     }
 }
 
+/// Width of the sample in the legend.
+fn swatch(kind: &Kind) -> f64 {
+    match kind {
+        Kind::Points(_) | Kind::Strip(_) | Kind::Estimates(_) | Kind::Cloud(_) => 8.0,
+        Kind::Bars(_) | Kind::Histogram { .. } => 14.0,
+        _ => 22.0,
+    }
+}
+
 fn styled(panel: &Panel) -> Vec<Styled<'_>> {
     let mut next = 0;
     panel
@@ -263,7 +280,7 @@ fn needs(panel: &Panel) -> [Needs; 2] {
             }
             Kind::Cells { values, .. } => {
                 y.categories = y.categories.max(Some(values.len()));
-                x.categories = x.categories.max(values.iter().map(Vec::len).max());
+                x.categories = x.categories.max(Some(values.iter().map(Vec::len).max().unwrap_or(0)));
             }
         }
     }
@@ -302,7 +319,7 @@ fn prepared<'a>(panel: &'a Panel, pen: &Pen, width: f64) -> Prepared<'a> {
             if entry.series.label.is_empty() || matches!(entry.series.kind, Kind::Cells { .. }) {
                 continue;
             }
-            let entry_width = SWATCH + 5.0 + pen.face.width(&entry.series.label, SMALL) + 12.0;
+            let entry_width = swatch(&entry.series.kind) + 5.0 + pen.face.width(&entry.series.label, SMALL) + 12.0;
             match legend.last_mut() {
                 Some((used, row)) if *used + entry_width <= width => {
                     row.push((index, *used));
@@ -316,9 +333,18 @@ fn prepared<'a>(panel: &'a Panel, pen: &Pen, width: f64) -> Prepared<'a> {
 }
 
 impl Prepared<'_> {
-    fn x_ticks(&self, x: &Ruler<'_>, width: f64) -> Vec<Tick> {
-        let about = if self.panel.x.scale == super::Scale::Log { 40.0 } else { 62.0 };
-        x.ticks((width / about) as usize)
+    fn x_ticks(&self, pen: &Pen, x: &Ruler<'_>, width: f64) -> Vec<Tick> {
+        let mut about = (width / if self.panel.x.scale == super::Scale::Log { 40.0 } else { 55.0 }) as usize;
+        loop {
+            let ticks = x.ticks(about);
+            let place = |tick: &Tick| x.fraction_of(tick.at) * width;
+            let half = |tick: &Tick| 0.5 * pen.face.width(&tick.label, SMALL);
+            let apart = |pair: &[Tick]| place(&pair[1]) - place(&pair[0]) >= half(&pair[0]) + half(&pair[1]) + 5.0;
+            if x.is_named() || about <= 2 || ticks.windows(2).all(apart) {
+                return ticks;
+            }
+            about -= 1;
+        }
     }
 
     fn y_ticks(&self, y: &Ruler<'_>, height: f64) -> Vec<Tick> {
@@ -345,7 +371,7 @@ impl Prepared<'_> {
             pen.widest(ticks.iter().map(|tick| tick.label.as_str()), SMALL)
         };
         let left = lines(y_label.len(), LABEL) + 4.0 + widest.min(220.0) + TICK + 4.0;
-        let ticks = self.x_ticks(x, size[0]);
+        let ticks = self.x_ticks(pen, x, size[0]);
         let labels = if x.is_named() {
             match self.category_lines(pen, &ticks, size[0]) {
                 Some(labels) => lines(labels.iter().map(Vec::len).max().unwrap_or(0), SMALL),
@@ -521,7 +547,8 @@ impl Prepared<'_> {
     }
 
     fn legend_entry(&self, pen: &mut Pen, entry: &Styled<'_>, [left, y]: [f64; 2]) {
-        let (colour, middle, right) = (entry.colour, left + 0.5 * SWATCH, left + SWATCH);
+        let (colour, right) = (entry.colour, left + swatch(&entry.series.kind));
+        let middle = 0.5 * (left + right);
         let across = vec![[left, y], [right, y]];
         let patch = |height: f64| Rect { x: [left, right], y: [y - height, y + height] }.corners();
         match &entry.series.kind {
@@ -561,7 +588,7 @@ impl Prepared<'_> {
             pen.path(vec![[x[0], rows(at)], [x[1], rows(at)]], light, 0.5);
         }
         if !plot.x.is_named() {
-            for tick in self.x_ticks(plot.x, plot.rect.width()) {
+            for tick in self.x_ticks(pen, plot.x, plot.rect.width()) {
                 pen.path(vec![[columns(tick.at), y[0]], [columns(tick.at), y[1]]], GRID, 0.6);
             }
         }
@@ -572,7 +599,7 @@ impl Prepared<'_> {
 
     fn labels(&self, pen: &mut Pen, plot: &Plot<'_>, marks: bool) {
         let Rect { x, y } = plot.rect;
-        let ticks = self.x_ticks(plot.x, plot.rect.width());
+        let ticks = self.x_ticks(pen, plot.x, plot.rect.width());
         let names = plot.x.is_named().then(|| self.category_lines(pen, &ticks, plot.rect.width()));
         let mut below = y[1] + TICK + 3.0;
         let mut lowest = below;
@@ -706,10 +733,10 @@ impl Prepared<'_> {
             if matches!(entry.series.kind, Kind::Vertical(_)) {
                 let fits = from[0] + 4.0 + pen.face.width(label, SMALL) < plot.rect.x[1];
                 let (at, anchor) = if fits { (from[0] + 4.0, Anchor::Start) } else { (from[0] - 4.0, Anchor::End) };
-                pen.text(label, [at, plot.rect.y[0] + SMALL], SMALL, anchor);
+                pen.noted(label, [at, plot.rect.y[0] + SMALL], anchor);
             } else {
                 let row = if to[1] - 1.4 * SMALL > plot.rect.y[0] { to[1] - 0.8 * SMALL } else { to[1] + 0.8 * SMALL };
-                pen.text(label, [to[0] - 4.0, row], SMALL, Anchor::End);
+                pen.noted(label, [to[0] - 4.0, row], Anchor::End);
             }
         }
         true
@@ -893,7 +920,6 @@ impl Plot<'_> {
         let shown: Vec<f64> = values.iter().copied().filter(|value| self.y.fraction(*value).is_some()).collect();
         let mean = shown.iter().map(|value| value / shown.len() as f64).sum();
         if let Some([_, row]) = self.place([middle, mean]).filter(|place| self.is_inside(*place)) {
-            pen.path(vec![[column - 0.8 * half, row], [column + 0.8 * half, row]], WHITE, 3.4);
             pen.path(vec![[column - 0.8 * half, row], [column + 0.8 * half, row]], DARK, 1.8);
         }
         true

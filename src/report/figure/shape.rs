@@ -86,7 +86,7 @@ impl Sheet {
 pub(super) fn svg(sheet: &Sheet) -> Result<String, FigureError> {
     let (width, height) = sheet.units()?;
     let mut text = String::new();
-    draw(&sheet.shapes, SVGBackend::with_string(&mut text, (width, height)))?;
+    draw(&sheet.shapes, SVGBackend::with_string(&mut text, (width, height)), true)?;
     // The library knows one size; the view box keeps its units.
     let header = format!("<svg width=\"{width}\" height=\"{height}\"");
     let points = format!("<svg width=\"{}\" height=\"{}\"", f64::from(width) / UNITS, f64::from(height) / UNITS);
@@ -96,22 +96,27 @@ pub(super) fn svg(sheet: &Sheet) -> Result<String, FigureError> {
 pub(super) fn png(sheet: &Sheet) -> Result<Vec<u8>, FigureError> {
     let (width, height) = sheet.units()?;
     let mut units = vec![255; width as usize * height as usize * 3];
-    draw(&sheet.shapes, Canvas::new(&mut units, width, height)?)?;
+    draw(&sheet.shapes, Canvas::new(&mut units, width, height)?, false)?;
     let (width, height, pixels) = canvas::reduced(&units, width, height, UNITS_PER_PIXEL);
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
+    // Large areas of one colour need no better.
+    encoder.set_compression(png::Compression::Fast);
     let mut writer = encoder.write_header()?;
     writer.write_image_data(&pixels)?;
     writer.finish()?;
     Ok(bytes)
 }
 
-fn draw<B: IntoDrawingArea>(shapes: &[Shape], backend: B) -> Result<(), FigureError> {
+/// The background is white already, or has to be made so.
+fn draw<B: IntoDrawingArea>(shapes: &[Shape], backend: B, fill: bool) -> Result<(), FigureError> {
     let area = backend.into_drawing_area();
     let failed = |error: DrawingAreaErrorKind<B::ErrorType>| FigureError::Drawing(error.to_string());
-    area.fill(&WHITE).map_err(failed)?;
+    if fill {
+        area.fill(&WHITE).map_err(failed)?;
+    }
     let unit = |[x, y]: [f64; 2]| ((x * UNITS).round() as i32, (y * UNITS).round() as i32);
     let rgb = |colour: &Rgb| RGBColor(colour[0], colour[1], colour[2]);
     for shape in shapes {

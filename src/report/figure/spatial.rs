@@ -70,7 +70,7 @@ pub(super) fn draw(pen: &mut Pen, panel: &Panel, z: &Axis, styled: &[Styled<'_>]
     let ticks = [0, 1, 2].map(|i| {
         let [from, to] = [place([0.0; 3]), place([0, 1, 2].map(|j| f64::from(i == j)))];
         let length = ((to[0] - from[0]) * (to[0] - from[0]) + (to[1] - from[1]) * (to[1] - from[1])).sqrt();
-        rulers[i].ticks((length / 36.0) as usize)
+        rulers[i].ticks((length / 30.0) as usize)
     });
     // The floor and the two walls behind: the axis across it, and at which end of that it stands.
     for (across, end) in [(2, 0.0), (0, 0.0), (1, 1.0)] {

@@ -377,13 +377,13 @@ fn ticks_are_round_numbers() {
         (ticks.join(" "), ruler.label())
     };
     let linear = Axis::linear("l (m)");
-    assert_eq!(labels(&linear, [0.0, 1.0]).0, "0.0 0.5 1.0");
+    assert_eq!(labels(&linear, [0.0, 1.0]).0, "0.0 0.2 0.4 0.6 0.8 1.0");
     assert_eq!(labels(&linear, [-1.0, 1.0]).0, "−1.0 −0.5 0.0 0.5 1.0");
-    assert_eq!(labels(&linear, [0.0, 100.0]).0, "0 50 100");
+    assert_eq!(labels(&linear, [0.0, 100.0]).0, "0 20 40 60 80 100");
     assert_eq!(labels(&linear, [0.0, 2e-6]), ("0.0 0.5 1.0 1.5 2.0".to_owned(), "l (m) ×10⁻⁶".to_owned()));
     assert_eq!(labels(&Axis::log("l"), [0.02, 30.0]).0, "0.1 1 10");
     assert_eq!(labels(&Axis::log("l"), [1e-9, 1e-3]).0, "10⁻⁸ 10⁻⁶ 10⁻⁴");
-    assert_eq!(labels(&Axis::log("l"), [3.0, 6.0]).0, "3 4 5 6");
+    assert_eq!(labels(&Axis::log("l"), [3.0, 6.0]).0, "3.0 3.5 4.0 4.5 5.0 5.5 6.0");
 }
 
 #[test]
