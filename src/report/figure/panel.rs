@@ -348,7 +348,7 @@ impl Prepared<'_> {
     }
 
     fn y_ticks(&self, y: &Ruler<'_>, height: f64) -> Vec<Tick> {
-        y.ticks((height / 38.0) as usize)
+        y.ticks((height / 44.0) as usize)
     }
 
     /// Room around the rectangle between the axes, if that is about as large.
@@ -469,25 +469,25 @@ pub(super) fn lay_out(figure: &Figure) -> Result<Sheet, FigureError> {
         pen.text("no data", [0.5 * width, top + 60.0], LABEL, Anchor::Middle);
         top += 120.0;
     }
-    for row in 0..rows {
+    for (row, inner_height) in heights.iter().copied().enumerate() {
         let members = || panels.iter().skip(row * columns).take(columns);
         let above = members().map(|panel| panel.room[1]).fold(0.0, f64::max);
         let below = members().map(|panel| panel.room[3]).fold(0.0, f64::max);
         let mut left = MARGIN;
         // Nothing of a figure that is too large need be drawn.
-        if width * (top + above + heights[row] + below) > 64e6 {
-            return Err(FigureError::TooLarge { width, height: top + above + heights[row] + below });
+        if width * (top + above + inner_height + below) > 64e6 {
+            return Err(FigureError::TooLarge { width, height: top + above + inner_height + below });
         }
         for (index, panel) in panels.iter_mut().enumerate().skip(row * columns).take(columns) {
             let column = columns_of(index);
             let outer = [left, left + widths[column]];
             let inner =
-                Rect { x: [left + lefts[column], outer[1] - rights[column]], y: [top + above, top + above + heights[row]] };
+                Rect { x: [left + lefts[column], outer[1] - rights[column]], y: [top + above, top + above + inner_height] };
             panel.equalise([inner.width(), inner.height()]);
             panel.draw(&mut pen, inner, outer, below);
             left = outer[1] + GAP;
         }
-        top += above + heights[row] + below + if row + 1 < rows { GAP } else { 0.0 };
+        top += above + inner_height + below + if row + 1 < rows { GAP } else { 0.0 };
     }
     Ok(Sheet { width, height: top + MARGIN, shapes: pen.shapes })
 }

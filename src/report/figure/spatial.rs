@@ -118,7 +118,9 @@ pub(super) fn draw(pen: &mut Pen, panel: &Panel, z: &Axis, styled: &[Styled<'_>]
             pen.text(&label, [x, y - 1.2 * LABEL], LABEL, Anchor::Middle);
         } else {
             let [x, y] = at(0.5);
-            pen.text(&label, [x + 24.0 * outwards[0], y + 32.0 * outwards[1]], LABEL, anchor);
+            // Beside the labels of the ticks.
+            let aside = if i == 0 { 24.0 } else { 62.0 };
+            pen.text(&label, [x + aside * outwards[0], y + 32.0 * outwards[1]], LABEL, anchor);
         }
     }
     for (entry, points) in clouds {
