@@ -1,4 +1,6 @@
-//! Results as tables for people. Units are in the headers; machines get the same results as JSON.
+//! Results as tables and figures for people. Units are in the headers; machines get the same results as JSON.
+
+pub mod figure;
 
 use comfy_table::{Cell, CellAlignment, LineStyle, Table, TableStyle};
 
