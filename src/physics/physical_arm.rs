@@ -69,7 +69,7 @@ impl PhysicalArm {
             converged = moved_m < self.settling.tolerance_m && moved_rad < self.settling.tolerance_rad;
         }
         let base_from_link = std::iter::once(self.arm.base_from_base_link)
-            .chain((0..count).map(|joint| self.world.base_from_link(joint)))
+            .chain((0..count).map(|joint| self.world.base_from_link(joint) * self.arm.joint_from_link[joint]))
             .collect();
         let seats = plays.iter().zip(&decisions).enumerate().map(|(joint, (play, by))| seat(joint, play, by)).collect();
         Settled {
