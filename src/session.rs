@@ -115,7 +115,10 @@ pub fn real_robot(start: &Start, real: &RealCell) -> Result<(Arm, Vec<String>), 
             let imported = urdf::import(text, "robot", real.base_link.as_deref(), real.tip_link.as_deref())?;
             Ok((imported.arm, imported.notes))
         }
-        None => Ok((scene::parse(&start.scene, "robot")?.scene.arm, Vec::new())),
+        None => {
+            let scene = scene::parse(&start.scene, "robot")?.scene;
+            Ok((scene.arm, scene.urdf_notes))
+        }
     }
 }
 

@@ -87,7 +87,7 @@ impl Sensor {
         self.position_sigma_m + self.position_sigma_per_m * (position - self.position_in_base.coords).norm()
     }
 
-    /// Whether the sensor sees `point` (in base, m): it does within its cone and at the cone's apex, and everywhere without a cone.
+    /// Whether the sensor sees `point` (in base, m): within its cone, apex included, or anywhere where it has none.
     #[must_use]
     pub fn sees(&self, point: &Vector3<f64>) -> bool {
         let Some(view) = &self.view else {

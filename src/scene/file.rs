@@ -52,7 +52,7 @@ pub struct ArmToml {
     pub name: String,
     /// How the frames are written.
     pub convention: Convention,
-    /// With `urdf`: file that holds the arm, its path relative to the scene's folder. Reading the scene puts its text into `urdf`.
+    /// With `urdf`: file that holds the arm, relative to the scene's folder. Reading the scene puts its text into `urdf`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub urdf_file: Option<String>,
     /// With `urdf`: the text itself, `'''<robot …>'''`.
