@@ -1,5 +1,6 @@
 //! Choosing the configurations to measure.
 
+pub mod approximate;
 pub mod candidates;
 pub mod outcome;
 pub mod swarm;
