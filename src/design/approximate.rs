@@ -349,7 +349,18 @@ impl Pool {
 
     /// tr(S Gᵢ) of all, where `slope` is S.
     fn sensitivities(&self, slope: &Slope) -> Vec<f64> {
-        (0..self.count + 1).into_par_iter().with_min_len(SHARE).map(|index| slope.along(self.gram(index))).collect()
+        let packed = self.n * (self.n + 1) / 2;
+        let mut sensitivities = vec![0.0; self.count + 1];
+        sensitivities.par_chunks_mut(4).zip(self.grams.par_chunks(4 * packed)).with_min_len(SHARE / 4).for_each(|(four, grams)| {
+            if four.len() == 4 {
+                let (first, second) = grams.split_at(2 * packed);
+                let ((a, b), (c, d)) = (first.split_at(packed), second.split_at(packed));
+                four.copy_from_slice(&four_dots(&slope.0, [a, b, c, d]));
+            } else {
+                four.iter_mut().zip(grams.chunks_exact(packed)).for_each(|(one, gram)| *one = slope.along(gram));
+            }
+        });
+        sensitivities
     }
 }
 

@@ -20,7 +20,18 @@ pub fn cholesky(matrix: &mut [f64], n: usize) -> bool {
     for i in 0..n {
         let (above, from_i) = matrix.split_at_mut(i * n);
         let row_i = &mut from_i[..=i];
-        for j in 0..i {
+        let mut j = 0;
+        // Four columns at a time share what is left of them.
+        while j + 4 <= i {
+            let lines = [j, j + 1, j + 2, j + 3].map(|j| &above[j * n..j * n + j + 1]);
+            let dots = four_dots(&row_i[..j], lines.map(|line| &line[..lines[0].len() - 1]));
+            for (lane, line) in lines.into_iter().enumerate() {
+                let dot = (0..lane).fold(dots[lane], |dot, k| dot + row_i[j + k] * line[j + k]);
+                row_i[j + lane] = (row_i[j + lane] - dot) / line[j + lane];
+            }
+            j += 4;
+        }
+        for j in j..i {
             let row_j = &above[j * n..=j * n + j];
             let dot = dot(&row_i[..j], &row_j[..j]);
             row_i[j] = (row_i[j] - dot) / row_j[j];
@@ -167,29 +178,27 @@ pub fn packed_gram(rows: &[f64], n: usize, gram: &mut [f64]) {
     }
 }
 
-/// Inner products of `a` with four others of its length.
+/// Inner products of `a` with four others of its length, in four interleaved sums each.
 #[must_use]
 pub fn four_dots(a: &[f64], others: [&[f64]; 4]) -> [f64; 4] {
-    let n = a.len();
-    let whole = n - n % 2;
-    let [b0, b1, b2, b3] = others.map(|other| &other[..n]);
-    let mut sums = [[0.0; 2]; 4];
-    for i in (0..whole).step_by(2) {
-        for lane in 0..2 {
-            let value = a[i + lane];
-            sums[0][lane] += value * b0[i + lane];
-            sums[1][lane] += value * b1[i + lane];
-            sums[2][lane] += value * b2[i + lane];
-            sums[3][lane] += value * b3[i + lane];
+    #[inline(always)]
+    fn add(sums: &mut [f64; 4], a: &[f64; 4], b: &[f64; 4]) {
+        for lane in 0..4 {
+            sums[lane] += a[lane] * b[lane];
         }
     }
-    let mut dots = sums.map(|[even, odd]| even + odd);
-    if whole < n {
-        for (dot, other) in dots.iter_mut().zip(others) {
-            *dot += a[whole] * other[whole];
-        }
+    let (whole, rest) = a.as_chunks::<4>();
+    let [(w0, r0), (w1, r1), (w2, r2), (w3, r3)] = others.map(|other| other[..a.len()].as_chunks::<4>());
+    let [mut s0, mut s1, mut s2, mut s3] = [[0.0; 4]; 4];
+    for ((((a, b0), b1), b2), b3) in whole.iter().zip(w0).zip(w1).zip(w2).zip(w3) {
+        add(&mut s0, a, b0);
+        add(&mut s1, a, b1);
+        add(&mut s2, a, b2);
+        add(&mut s3, a, b3);
     }
-    dots
+    let rest_of = |other: &[f64]| rest.iter().zip(other).map(|(a, b)| a * b).sum::<f64>();
+    let sum = |[a, b, c, d]: [f64; 4]| (a + b) + (c + d);
+    [sum(s0) + rest_of(r0), sum(s1) + rest_of(r1), sum(s2) + rest_of(r2), sum(s3) + rest_of(r3)]
 }
 
 #[cfg(test)]
