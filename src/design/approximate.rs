@@ -123,13 +123,17 @@ pub fn optimise(blocks: &Blocks, criterion: Criterion<'_>, settings: &Settings) 
 }
 
 impl ApproximateDesign {
+    fn rank(&self) -> f64 {
+        self.information.len().isqrt() as f64
+    }
+
     /// What no set of `poses` candidates can beat, repeated ones allowed, where its information is the sum over its poses: an upper
     /// bound of its log det, or a lower bound of its tr(L M⁻¹). It is `poses` times the information of weights, after all.
     #[must_use]
     pub fn bound_of_set(&self, criterion: Criterion<'_>, poses: usize) -> f64 {
         let poses = poses as f64;
         match criterion {
-            Criterion::D => self.bound + libm::sqrt(self.information.len() as f64) * libm::log(poses),
+            Criterion::D => self.bound + self.rank() * libm::log(poses),
             Criterion::L(_) => self.bound / poses,
         }
     }
@@ -140,7 +144,7 @@ impl ApproximateDesign {
     pub fn efficiency_of_set(&self, criterion: Criterion<'_>, poses: usize, value: f64) -> f64 {
         let bound = self.bound_of_set(criterion, poses);
         match criterion {
-            Criterion::D => libm::exp((value - bound) / libm::sqrt(self.information.len() as f64)),
+            Criterion::D => libm::exp((value - bound) / self.rank()),
             Criterion::L(_) => bound / value,
         }
     }
@@ -311,15 +315,12 @@ impl Pool {
         let whitening = inverse_transposed(&factor, n);
         let mut rows = vec![0.0; count * size + n * n];
         let mut grams = vec![0.0; (count + 1) * packed];
-        rows.par_chunks_mut(size)
-            .zip(grams.par_chunks_mut(packed))
-            .take(count)
-            .with_min_len(SHARE)
-            .enumerate()
-            .for_each(|(index, (rows, gram))| {
+        rows.par_chunks_mut(size).zip(grams.par_chunks_mut(packed)).take(count).with_min_len(SHARE).enumerate().for_each(
+            |(index, (rows, gram))| {
                 multiply_upper(blocks.get(index), &whitening, n, rows);
                 packed_gram(rows, n, gram);
-            });
+            },
+        );
         for i in 0..n {
             rows[count * size + i * n + i] = 1.0;
         }
@@ -328,7 +329,11 @@ impl Pool {
     }
 
     fn rows(&self, index: usize) -> &[f64] {
-        if index < self.count { &self.rows[index * self.size..(index + 1) * self.size] } else { &self.rows[self.count * self.size..] }
+        if index < self.count {
+            &self.rows[index * self.size..(index + 1) * self.size]
+        } else {
+            &self.rows[self.count * self.size..]
+        }
     }
 
     fn gram(&self, index: usize) -> &[f64] {
@@ -347,19 +352,21 @@ impl Pool {
         sum
     }
 
-    /// tr(S Gᵢ) of all, where `slope` is S.
-    fn sensitivities(&self, slope: &Slope) -> Vec<f64> {
+    /// tr(S Gᵢ) of all, the uniform design last, where `slope` is a point's S.
+    fn sensitivities(&self, slope: &[f64]) -> Vec<f64> {
         let packed = self.n * (self.n + 1) / 2;
         let mut sensitivities = vec![0.0; self.count + 1];
-        sensitivities.par_chunks_mut(4).zip(self.grams.par_chunks(4 * packed)).with_min_len(SHARE / 4).for_each(|(four, grams)| {
-            if four.len() == 4 {
-                let (first, second) = grams.split_at(2 * packed);
-                let ((a, b), (c, d)) = (first.split_at(packed), second.split_at(packed));
-                four.copy_from_slice(&four_dots(&slope.0, [a, b, c, d]));
-            } else {
-                four.iter_mut().zip(grams.chunks_exact(packed)).for_each(|(one, gram)| *one = slope.along(gram));
-            }
-        });
+        sensitivities.par_chunks_mut(4).zip(self.grams.par_chunks(4 * packed)).with_min_len(SHARE / 4).for_each(
+            |(four, grams)| {
+                if four.len() == 4 {
+                    let (first, second) = grams.split_at(2 * packed);
+                    let ((a, b), (c, d)) = (first.split_at(packed), second.split_at(packed));
+                    four.copy_from_slice(&four_dots(slope, [a, b, c, d]));
+                } else {
+                    four.iter_mut().zip(grams.chunks_exact(packed)).for_each(|(one, gram)| *one = dot(slope, gram));
+                }
+            },
+        );
         sensitivities
     }
 }
@@ -384,8 +391,12 @@ fn numerical_rank(matrix: &[f64], n: usize) -> usize {
     let mut rest: Vec<f64> = (0..n * n).map(|at| matrix[at] * scale[at / n] * scale[at % n]).collect();
     let mut left: Vec<usize> = (0..n).collect();
     let floor = 16.0 * n as f64 * f64::EPSILON;
-    while let Some((position, pivot)) =
-        left.iter().map(|&i| rest[i * n + i]).enumerate().max_by(|(_, a), (_, b)| a.total_cmp(b)).filter(|(_, pivot)| *pivot > floor)
+    while let Some((position, pivot)) = left
+        .iter()
+        .map(|&i| rest[i * n + i])
+        .enumerate()
+        .max_by(|(_, a), (_, b)| a.total_cmp(b))
+        .filter(|(_, pivot)| *pivot > floor)
     {
         let k = left.swap_remove(position);
         for &i in &left {
@@ -400,31 +411,19 @@ fn numerical_rank(matrix: &[f64], n: usize) -> usize {
 
 /// What the criterion is at some weights, in a pool's coordinates.
 struct Point {
-    /// V with VᵀMV the identity and, for L, VᵀM... the criterion's matrix diagonal.
-    transform: Vec<f64>,
-    slope: Slope,
+    /// S such that a candidate's sensitivity is tr(S G): packed lower triangle, what is beside the diagonal twice.
+    slope: Vec<f64>,
     /// Σ wᵢ sᵢ of weights that add up to one: the rank, or tr(L M⁻¹).
     mean: f64,
-    /// L's eigenvalues in the transform's coordinates.
-    eigenvalues: Option<Vec<f64>>,
+    /// V with VᵀMV the identity (upper triangular).
+    whitening: Vec<f64>,
+    /// VᵀLV.
+    matrix: Option<Vec<f64>>,
 }
 
-/// S such that a candidate's sensitivity is tr(S G): packed lower triangle, what is beside the diagonal twice.
-struct Slope(Vec<f64>);
-
-impl Slope {
-    fn of(full: &[f64], n: usize) -> Slope {
-        let entries = (0..n).flat_map(|i| (0..=i).map(move |j| if i == j { full[i * n + i] } else { 2.0 * full[i * n + j] }));
-        Slope(entries.collect())
-    }
-
-    /// tr(S G) of a packed G.
-    fn along(&self, gram: &[f64]) -> f64 {
-        dot(&self.0, gram)
-    }
-
-    /// At the packed `information`, for D or the L of a pool's coordinates; with it the mean. None where the information is singular.
-    fn at(information: &[f64], matrix: Option<&[f64]>, n: usize) -> Option<(Slope, f64, Vec<f64>, Option<Vec<f64>>)> {
+impl Point {
+    /// At the packed `information`, for D or for the L `matrix`; none where the information is singular.
+    fn at(information: &[f64], matrix: Option<&[f64]>, n: usize) -> Option<Point> {
         let mut factor = unpacked(information, n);
         if !cholesky(&mut factor, n) {
             return None;
@@ -432,45 +431,66 @@ impl Slope {
         let upper = inverse_transposed(&factor, n);
         let lower = transposed(&upper, n);
         let mut full = vec![0.0; n * n];
-        match matrix {
+        let matrix = matrix.map(|matrix| symmetrically_transformed(matrix, &upper, n));
+        let mean = match &matrix {
             None => {
                 multiply(&upper, &lower, n, &mut full);
-                Some((Slope::of(&full, n), n as f64, upper, None))
+                n as f64
             }
             Some(matrix) => {
-                let inner = symmetrically_transformed(matrix, &upper, n);
                 let mut half = vec![0.0; n * n];
-                multiply(&inner, &lower, n, &mut half);
+                multiply(matrix, &lower, n, &mut half);
                 multiply(&upper, &half, n, &mut full);
-                Some((Slope::of(&full, n), trace(&inner, n), upper, Some(inner)))
+                trace(matrix, n)
             }
-        }
+        };
+        let entries = (0..n).flat_map(|i| (0..=i).map(move |j| (i, j)));
+        let slope = entries.map(|(i, j)| if i == j { full[i * n + i] } else { 2.0 * full[i * n + j] }).collect();
+        Some(Point { slope, mean, whitening: upper, matrix })
+    }
+
+    /// How the criterion bends: tr(GᵢGⱼ) for D, 2 tr(Λ GᵢGⱼ) = Σ (λₖ + λₗ) Gᵢₖₗ Gⱼₖₗ for L, in coordinates where the information
+    /// is the identity and L is diagonal, Λ.
+    fn curvature(&self, n: usize) -> Curvature {
+        let (transform, eigenvalues) = match &self.matrix {
+            None => (self.whitening.clone(), None),
+            Some(matrix) => {
+                let eigen = SymmetricEigen::new(DMatrix::from_row_slice(n, n, matrix));
+                // nalgebra stores columns.
+                let vectors = transposed(eigen.eigenvectors.as_slice(), n);
+                let mut transform = vec![0.0; n * n];
+                multiply(&self.whitening, &vectors, n, &mut transform);
+                (transform, Some(eigen.eigenvalues.as_slice().to_vec()))
+            }
+        };
+        Curvature { transform, eigenvalues }
     }
 }
 
-impl Point {
-    fn at(information: &[f64], matrix: Option<&[f64]>, n: usize) -> Option<Point> {
-        let (slope, mean, upper, inner) = Slope::at(information, matrix, n)?;
-        let Some(inner) = inner else {
-            return Some(Point { transform: upper, slope, mean, eigenvalues: None });
-        };
-        let eigen = SymmetricEigen::new(DMatrix::from_row_slice(n, n, &inner));
-        // Column-major storage: the slice is the transpose's, row-major.
-        let vectors = transposed(eigen.eigenvectors.as_slice(), n);
-        let mut transform = vec![0.0; n * n];
-        multiply(&upper, &vectors, n, &mut transform);
-        Some(Point { transform, slope, mean, eigenvalues: Some(eigen.eigenvalues.iter().copied().collect()) })
+/// Second derivatives of a criterion are inner products of transformed Gram matrices.
+struct Curvature {
+    /// V with XV the block in the derivatives' coordinates.
+    transform: Vec<f64>,
+    /// L's in these coordinates.
+    eigenvalues: Option<Vec<f64>>,
+}
+
+impl Curvature {
+    /// Whether L has no negative eigenvalue but for rounding.
+    fn is_semidefinite(&self) -> bool {
+        let values = self.eigenvalues.as_deref().unwrap_or_default();
+        let largest = values.iter().copied().fold(0.0, f64::max);
+        values.iter().all(|value| *value >= -1e-9 * largest)
     }
 
-    /// Factors of the packed entries of transformed Gram matrices, which make inner products of them the criterion's second
-    /// derivatives: tr(GᵢGⱼ) for D, 2 tr(Λ GᵢGⱼ) = Σ (λₖ + λₗ) Gᵢₖₗ Gⱼₖₗ for L.
+    /// Factors of the packed entries of transformed Gram matrices, which make the derivatives plain inner products.
     fn factors(&self, n: usize) -> Vec<f64> {
-        let factor = |i: usize, j: usize| {
+        let factor = |(i, j): (usize, usize)| {
             let twice = if i == j { 1.0 } else { 2.0 };
-            let curvature = self.eigenvalues.as_ref().map_or(1.0, |values| (values[i] + values[j]).max(0.0));
-            (twice * curvature).sqrt()
+            let bend = self.eigenvalues.as_ref().map_or(1.0, |values| (values[i] + values[j]).max(0.0));
+            f64::sqrt(twice * bend)
         };
-        (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))).map(|(i, j)| factor(i, j)).collect()
+        (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))).map(factor).collect()
     }
 
     /// Second derivatives by the weights of `set` (row-major, both triangles).
@@ -519,7 +539,6 @@ impl Point {
 /// The weights of the least gap found, and the number of steps.
 fn search(pool: &Pool, matrix: Option<&[f64]>, settings: &Settings) -> Result<(Vec<f64>, usize), ApproximateError> {
     let n = pool.n;
-    let packed = n * (n + 1) / 2;
     // The certificate's rounding differs from the search's.
     let goal = 0.99 * settings.gap;
     let mut support = vec![pool.count];
@@ -529,11 +548,9 @@ fn search(pool: &Pool, matrix: Option<&[f64]>, settings: &Settings) -> Result<(V
     loop {
         let information = pool.information(&support, &weights);
         let Some(point) = Point::at(&information, matrix, n) else { break };
-        if let Some(values) = &point.eigenvalues {
-            let (smallest, largest) = values.iter().fold((0.0, 0.0), |(low, high): (f64, f64), v| (low.min(*v), high.max(*v)));
-            if smallest < -1e-9 * largest {
-                return Err(ApproximateError::NotSemidefinite);
-            }
+        let curvature = point.curvature(n);
+        if !curvature.is_semidefinite() {
+            return Err(ApproximateError::NotSemidefinite);
         }
         let sensitivities = pool.sensitivities(&point.slope);
         let largest = sensitivities.iter().copied().fold(0.0, f64::max);
@@ -541,13 +558,12 @@ fn search(pool: &Pool, matrix: Option<&[f64]>, settings: &Settings) -> Result<(V
         if gap < best.0 {
             best = (gap, support.clone(), weights.clone());
         }
-        if std::env::var("TRACE").is_ok() { eprintln!("{iterations} gap {gap:.3e} support {} bg {:.2e}", support.len(), if support.last()==Some(&pool.count) {weights[weights.len()-1]} else {0.0}); }
         if gap <= goal || iterations == settings.max_iterations {
             break;
         }
         iterations += 1;
 
-        let set = working_set(&support, &sensitivities, point.mean, entrants(n));
+        let set = working_set(&support, &sensitivities, point.mean, n + ENTRANTS);
         let mut start = vec![0.0; set.len()];
         for (index, weight) in support.iter().zip(&weights) {
             if let Ok(at) = set.binary_search(index) {
@@ -555,9 +571,9 @@ fn search(pool: &Pool, matrix: Option<&[f64]>, settings: &Settings) -> Result<(V
             }
         }
         // Newton's model at w is ½ xᵀHx − bᵀx with b = Hw − gradient, and Hw is known, because the criterion is homogeneous.
-        let curvature = if matrix.is_none() { 1.0 } else { 2.0 };
-        let linear: Vec<f64> = set.iter().map(|&index| (1.0 + curvature) * sensitivities[index] - point.mean).collect();
-        let hessian = point.hessian(pool, &set);
+        let multiple = if matrix.is_none() { 2.0 } else { 3.0 };
+        let linear: Vec<f64> = set.iter().map(|&index| multiple * sensitivities[index] - point.mean).collect();
+        let hessian = curvature.hessian(pool, &set);
         let step = nonnegative_minimum(&hessian, &linear, &start)
             .map(|minimum| minimum.iter().zip(&start).map(|(to, from)| to - from).collect::<Vec<f64>>())
             .and_then(|direction| line_search(pool, matrix, &set, &start, &direction, &information, &point));
@@ -578,7 +594,6 @@ fn search(pool: &Pool, matrix: Option<&[f64]>, settings: &Settings) -> Result<(V
                 weights.push(weight / sum);
             }
         }
-        debug_assert_eq!(information.len(), packed);
     }
     let (_, support, weights) = best;
     let mut all = vec![0.0; pool.count];
@@ -595,10 +610,8 @@ fn search(pool: &Pool, matrix: Option<&[f64]>, settings: &Settings) -> Result<(V
     Ok((all, iterations))
 }
 
-/// Candidates without weight that a step considers at most.
-fn entrants(n: usize) -> usize {
-    std::env::var("ENTER").ok().and_then(|v| v.parse().ok()).unwrap_or(n + 4)
-}
+/// Candidates without weight that a step considers at most, beside as many as the rank.
+const ENTRANTS: usize = 4;
 
 /// The candidates of `support` and the `entrants` best others whose sensitivity is above the mean, ascending.
 fn working_set(support: &[usize], sensitivities: &[f64], mean: f64, entrants: usize) -> Vec<usize> {
@@ -625,14 +638,14 @@ fn line_search(
     let n = pool.n;
     let change = pool.information(set, direction);
     let penalty = point.mean * direction.iter().sum::<f64>();
-    let initial = penalty - point.slope.along(&change);
+    let initial = penalty - dot(&point.slope, &change);
     if initial.is_nan() || initial >= 0.0 {
         return None;
     }
     // Of the criterion along the line, at `t`.
     let derivative = |t: f64| {
         let information: Vec<f64> = information.iter().zip(&change).map(|(from, change)| from + t * change).collect();
-        Slope::at(&information, matrix, n).map_or(f64::INFINITY, |(slope, ..)| penalty - slope.along(&change))
+        Point::at(&information, matrix, n).map_or(f64::INFINITY, |at| penalty - dot(&at.slope, &change))
     };
     let (mut falling, mut rising, mut t) = (0.0, 1.0, 1.0);
     for _ in 0..40 {
@@ -644,13 +657,9 @@ fn line_search(
             }
         } else {
             rising = t;
-            if falling == 0.0 && t < 1e-9 {
-                break;
-            }
         }
         t = 0.5 * (falling + rising);
     }
-    if std::env::var("TRACE").is_ok() { eprintln!("   t {falling} set {}", set.len()); }
     (falling > 0.0).then(|| {
         // At the end of the line zeros are exact.
         start.iter().zip(direction).map(|(from, change)| (from + falling * change).max(0.0)).collect()
@@ -661,14 +670,14 @@ fn line_search(
 /// prevents it.
 fn nonnegative_minimum(hessian: &[f64], linear: &[f64], start: &[f64]) -> Option<Vec<f64>> {
     let k = linear.len();
-    let mut free: Vec<bool> = start.iter().zip(linear).map(|(weight, _)| *weight > 0.0).collect();
+    let mut free: Vec<bool> = start.iter().map(|weight| *weight > 0.0).collect();
     let largest = (0..k).map(|i| hessian[i * k + i]).fold(0.0, f64::max);
     // Candidates may be alike.
     let ridge = 1e-12 * largest;
     let tolerance = 1e-12 * linear.iter().fold(0.0, |largest: f64, entry| largest.max(entry.abs()));
     let (mut fewest, mut patience) = (k + 1, PATIENCE);
     let mut factor = Vec::new();
-    for pivoting in 0..200 {
+    for _ in 0..200 {
         let set: Vec<usize> = (0..k).filter(|i| free[*i]).collect();
         let m = set.len();
         factor.clear();
@@ -685,10 +694,11 @@ fn nonnegative_minimum(hessian: &[f64], linear: &[f64], start: &[f64]) -> Option
         let mut minimum = vec![0.0; k];
         set.iter().zip(&values).for_each(|(i, value)| minimum[*i] = *value);
         let wrong: Vec<usize> = (0..k)
-            .filter(|&i| if free[i] { minimum[i] < 0.0 } else { dot(&hessian[i * k..(i + 1) * k], &minimum) < linear[i] - tolerance })
+            .filter(
+                |&i| if free[i] { minimum[i] < 0.0 } else { dot(&hessian[i * k..(i + 1) * k], &minimum) < linear[i] - tolerance },
+            )
             .collect();
         if wrong.is_empty() {
-            if std::env::var("TRACE").is_ok() { eprintln!("   pivotings {pivoting} free {m} of {k}"); }
             return Some(minimum);
         }
         let exchanged = if wrong.len() < fewest {
@@ -708,3 +718,331 @@ fn nonnegative_minimum(hessian: &[f64], linear: &[f64], start: &[f64]) -> Option
 
 /// Exchanges of a block that may fail to reduce the number of wrong signs.
 const PATIENCE: usize = 3;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arm::Arm;
+    use crate::quality::information::{InformationModel, JacobianScratch};
+    use crate::scene::Weights;
+    use crate::seed::stream;
+
+    const CLOSE: Settings = Settings { gap: 1e-9, max_iterations: 200 };
+
+    /// Candidates x of a polynomial regression: blocks 1, x, x², …
+    fn polynomial(degree: usize, points: &[f64]) -> Blocks {
+        let mut blocks = Blocks::new(degree + 1, 1);
+        for x in points {
+            blocks.push(&(0..=degree).map(|power| x.powi(power as i32)).collect::<Vec<f64>>());
+        }
+        blocks
+    }
+
+    fn grid(steps: i32) -> Vec<f64> {
+        (0..=steps).map(|i| f64::from(2 * i - steps) / f64::from(steps)).collect()
+    }
+
+    fn weight_near(points: &[f64], weights: &[f64], x: f64) -> f64 {
+        points.iter().zip(weights).filter(|(point, _)| (*point - x).abs() < 0.02).map(|(_, weight)| weight).sum()
+    }
+
+    fn paper() -> crate::scene::Scene {
+        crate::scene::read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/paper.toml")).unwrap().scene
+    }
+
+    /// `count` random configurations within `share` of the limits.
+    fn configurations(arm: &Arm, count: usize, share: f64, label: &str) -> Vec<f64> {
+        let mut stream = stream(1, label);
+        (0..count).flat_map(|_| &arm.chain.joints).map(|joint| share * stream.uniform(joint.lower, joint.upper)).collect()
+    }
+
+    /// Candidates of the paper's arm; and the mean of PᵀP over other configurations, for the first `rows` rows of the Jacobian.
+    fn pool(count: usize, share: f64, attitude: bool, rows: usize) -> (Blocks, Vec<f64>) {
+        let mut scene = paper();
+        if attitude {
+            scene.sensor.attitude_sigma_rad = Some(0.001);
+        } else {
+            scene.sensor.attitude_sigma_rad = None;
+        }
+        let model = InformationModel::new(&scene.arm, &scene.sensor, Weights::Noise);
+        let n = model.rank();
+        let mut matrix = vec![0.0; n * n];
+        let (mut scratch, mut jacobian) = (JacobianScratch::default(), vec![0.0; 6 * n]);
+        for joints in configurations(&scene.arm, 100, 1.0, "test/approximate/workspace").chunks_exact(8) {
+            model.unscaled_into(joints, &mut scratch, &mut jacobian);
+            add_gram(&jacobian[..rows * n], 0.01, n, &mut matrix);
+        }
+        for i in 0..n {
+            for j in 0..i {
+                matrix[j * n + i] = matrix[i * n + j];
+            }
+        }
+        (Blocks::of(&model, &configurations(&scene.arm, count, share, "test/approximate/pool"), 8), matrix)
+    }
+
+    fn information(blocks: &Blocks, weights: &[f64]) -> DMatrix<f64> {
+        let mut sum = DMatrix::zeros(blocks.rank(), blocks.rank());
+        for (block, weight) in blocks.iter().zip(weights) {
+            let rows = DMatrix::from_row_slice(blocks.rows_per_pose(), blocks.rank(), block);
+            sum += *weight * rows.transpose() * rows;
+        }
+        sum
+    }
+
+    /// Value and sensitivities by nalgebra.
+    fn reference(blocks: &Blocks, criterion: Criterion<'_>, weights: &[f64]) -> (f64, Vec<f64>) {
+        let n = blocks.rank();
+        let factor = information(blocks, weights).cholesky().unwrap();
+        let inverse = factor.inverse();
+        let (value, slope) = match criterion {
+            Criterion::D => (2.0 * factor.l().diagonal().map(f64::ln).sum(), inverse),
+            Criterion::L(matrix) => {
+                let matrix = DMatrix::from_row_slice(n, n, matrix);
+                ((&matrix * &inverse).trace(), &inverse * matrix * &inverse)
+            }
+        };
+        let sensitivity = |block| {
+            let rows = DMatrix::from_row_slice(blocks.rows_per_pose(), n, block);
+            (&rows * &slope * rows.transpose()).trace()
+        };
+        (value, blocks.iter().map(sensitivity).collect())
+    }
+
+    /// That the design is one, and that its numbers are true.
+    fn check(blocks: &Blocks, criterion: Criterion<'_>, design: &ApproximateDesign) {
+        assert!((design.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12 && design.weights.iter().all(|weight| *weight >= 0.0));
+        let (value, sensitivities) = reference(blocks, criterion, &design.weights);
+        let largest = sensitivities.iter().copied().fold(0.0, f64::max);
+        let (mean, bound) = match criterion {
+            Criterion::D => {
+                let n = blocks.rank() as f64;
+                (n, value + n * (largest / n).max(1.0).ln())
+            }
+            Criterion::L(_) => (value, value * value / largest.max(value)),
+        };
+        let tolerance = 1e-8 * value.abs().max(1e-3);
+        assert!((design.value - value).abs() < tolerance, "{} is not {value}", design.value);
+        assert!((design.bound - bound).abs() < tolerance, "{} is not {bound}", design.bound);
+        assert!((design.gap - (largest / mean - 1.0).max(0.0)).abs() < 1e-8, "{} is not {}", design.gap, largest / mean - 1.0);
+        for (ours, theirs) in design.sensitivities(criterion, blocks).iter().zip(sensitivities) {
+            assert!((ours - theirs / mean).abs() < 1e-7 * ours.max(1.0));
+        }
+    }
+
+    fn converged(blocks: &Blocks, criterion: Criterion<'_>, settings: &Settings) -> ApproximateDesign {
+        let design = optimise(blocks, criterion, settings).unwrap();
+        check(blocks, criterion, &design);
+        assert!(design.converged && design.gap <= settings.gap, "{} after {}", design.gap, design.iterations);
+        design
+    }
+
+    #[test]
+    fn quadratic_regression_has_the_known_designs() {
+        // Fedorov, 1972: D-optimal are thirds at −1, 0 and 1; the least mean variance over [−1, 1] have 1/4, 1/2, 1/4.
+        let points = grid(200);
+        let blocks = polynomial(2, &points);
+        let design = converged(&blocks, Criterion::D, &CLOSE);
+        let expected = (4.0f64 / 27.0).ln();
+        assert!((design.value - expected).abs() < 1e-8 && design.bound >= expected - 1e-12);
+        for x in [-1.0, 0.0, 1.0] {
+            assert!((weight_near(&points, &design.weights, x) - 1.0 / 3.0).abs() < 1e-6);
+        }
+        let third = 1.0 / 3.0;
+        let mean = [1.0, 0.0, third, 0.0, third, 0.0, third, 0.0, 0.2];
+        let design = converged(&blocks, Criterion::L(&mean), &CLOSE);
+        for (x, weight) in [(-1.0, 0.25), (0.0, 0.5), (1.0, 0.25)] {
+            assert!((weight_near(&points, &design.weights, x) - weight).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn polynomial_regression_has_its_weight_at_legendres_zeros() {
+        // Guest, Annals of Mathematical Statistics 29, 1958: the zeros of (1 − x²) P′(x), equally weighted.
+        let (outer, inner) = (((7.0 + 2.0 * 7f64.sqrt()) / 21.0).sqrt(), ((7.0 - 2.0 * 7f64.sqrt()) / 21.0).sqrt());
+        let zeros = [-1.0, -outer, -inner, inner, outer, 1.0];
+        let mut points = grid(400);
+        points.extend(&zeros[1..5]);
+        let design = converged(&polynomial(5, &points), Criterion::D, &CLOSE);
+        for zero in zeros {
+            assert!((weight_near(&points, &design.weights, zero) - 1.0 / 6.0).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn the_multiplicative_algorithm_arrives_at_the_same() {
+        let (blocks, matrix) = pool(60, 0.6, true, 3);
+        for criterion in [Criterion::D, Criterion::L(&matrix)] {
+            let design = converged(&blocks, criterion, &CLOSE);
+            let mut weights = vec![1.0 / 60.0; 60];
+            let mut value = 0.0;
+            for _ in 0..1500 {
+                let (at, sensitivities) = reference(&blocks, criterion, &weights);
+                value = at;
+                for (weight, sensitivity) in weights.iter_mut().zip(sensitivities) {
+                    *weight *= if matches!(criterion, Criterion::D) { sensitivity } else { sensitivity.sqrt() };
+                }
+                let sum: f64 = weights.iter().sum();
+                weights.iter_mut().for_each(|weight| *weight /= sum);
+            }
+            let worse = match criterion {
+                Criterion::D => design.bound - value,
+                Criterion::L(_) => value / design.bound - 1.0,
+            };
+            assert!((0.0..1e-3).contains(&worse), "{worse}");
+        }
+    }
+
+    #[test]
+    fn no_set_beats_the_bound() {
+        let (blocks, matrix) = pool(200, 0.5, true, 3);
+        let mut stream = stream(1, "test/approximate/sets");
+        for criterion in [Criterion::D, Criterion::L(&matrix)] {
+            let design = converged(&blocks, criterion, &Settings::default());
+            for m in [12, 20, 40] {
+                for trial in 0..30 {
+                    let mut counts = vec![0.0; 200];
+                    // Some of the sets are of candidates of much weight.
+                    let chosen = |at: &usize| trial % 2 == 0 || design.weights[*at] > 0.0;
+                    (0..).map(|_| stream.index(200)).filter(chosen).take(m).for_each(|at| counts[at] += 1.0);
+                    let (value, _) = reference(&blocks, criterion, &counts);
+                    let efficiency = design.efficiency_of_set(criterion, m, value);
+                    assert!(efficiency > 0.0 && efficiency < 1.0, "{efficiency}");
+                }
+            }
+            // The weights themselves, as if they were a set of one.
+            let own = design.efficiency_of_set(criterion, 1, design.value);
+            assert!((own * (1.0 + design.gap) - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn pools_of_all_kinds_converge() {
+        for (count, share, attitude, rows) in [
+            (1000, 1.0, true, 6),
+            (1000, 0.3, true, 3),
+            (300, 0.1, true, 6),
+            (500, 0.5, false, 3),
+            (200, 0.2, false, 3),
+            (7, 1.0, true, 6),
+            (12, 1.0, false, 3),
+        ] {
+            let (blocks, matrix) = pool(count, share, attitude, rows);
+            for criterion in [Criterion::D, Criterion::L(&matrix)] {
+                converged(&blocks, criterion, &Settings::default());
+                converged(&blocks, criterion, &Settings { gap: 1e-7, ..CLOSE });
+            }
+        }
+    }
+
+    #[test]
+    fn candidates_may_be_alike_few_and_badly_scaled() {
+        let (blocks, matrix) = pool(150, 0.3, true, 6);
+        let once = converged(&blocks, Criterion::D, &CLOSE);
+        let (mut twice, mut scaled) = (Blocks::new(36, 6), Blocks::new(36, 6));
+        let unit: Vec<f64> = (0..36).map(|column| 10f64.powi(column % 9 - 4)).collect();
+        for block in blocks.iter().chain(blocks.iter()) {
+            twice.push(block);
+        }
+        for block in blocks.iter() {
+            scaled.push(&block.iter().enumerate().map(|(at, entry)| entry * unit[at % 36]).collect::<Vec<f64>>());
+        }
+        assert!((converged(&twice, Criterion::D, &CLOSE).value - once.value).abs() < 1e-7);
+        let design = optimise(&scaled, Criterion::D, &CLOSE).unwrap();
+        let shift: f64 = 2.0 * unit.iter().map(|unit| unit.ln()).sum::<f64>();
+        assert!(design.converged && (design.value - shift - once.value).abs() < 1e-6);
+        converged(&twice, Criterion::L(&matrix), &CLOSE);
+
+        // Six configurations of six rows have nothing to choose: each is needed.
+        let mut six = Blocks::new(36, 6);
+        blocks.iter().take(6).for_each(|block| six.push(block));
+        let design = converged(&six, Criterion::D, &CLOSE);
+        assert!(design.weights.iter().all(|weight| (weight - 1.0 / 6.0).abs() < 1e-9));
+
+        let mut stream = stream(1, "test/approximate/two");
+        let mut two = Blocks::new(2, 3);
+        for _ in 0..500 {
+            two.push(&[0; 6].map(|_| stream.normal()));
+        }
+        converged(&two, Criterion::D, &CLOSE);
+        converged(&two, Criterion::L(&[1.0, 0.5, 0.5, 1.0]), &CLOSE);
+        let constant = converged(&polynomial(0, &[1.0, 1.0, 0.5]), Criterion::D, &CLOSE);
+        assert!(constant.value.abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_only_some_parameters_matter_for_has_a_design_as_well() {
+        // Variance of the slope at 0 and of a prediction at 1: rank one, the information of the optimum is singular or nearly so.
+        let points = grid(100);
+        let blocks = polynomial(3, &points);
+        for direction in [[0.0, 1.0, 0.0, 0.0], [1.0, 1.0, 1.0, 1.0]] {
+            let matrix: Vec<f64> = (0..16).map(|at| direction[at / 4] * direction[at % 4]).collect();
+            let design = optimise(&blocks, Criterion::L(&matrix), &Settings::default()).unwrap();
+            check(&blocks, Criterion::L(&matrix), &design);
+            eprintln!("{} {} {} {}", design.gap, design.iterations, design.value, design.bound);
+        }
+        let nothing = converged(&blocks, Criterion::L(&[0.0; 16]), &CLOSE);
+        assert_eq!((nothing.value, nothing.bound, nothing.gap), (0.0, 0.0, 0.0));
+    }
+
+    #[test]
+    fn threads_do_not_change_a_bit() {
+        let (blocks, matrix) = pool(700, 0.6, true, 3);
+        for criterion in [Criterion::D, Criterion::L(&matrix)] {
+            let with = |threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| optimise(&blocks, criterion, &Settings::default()).unwrap())
+            };
+            assert_eq!(with(1), with(2));
+        }
+    }
+
+    #[test]
+    fn a_search_cut_short_tells_its_gap() {
+        let (blocks, matrix) = pool(300, 0.3, true, 6);
+        for criterion in [Criterion::D, Criterion::L(&matrix)] {
+            let mut best = optimise(&blocks, criterion, &CLOSE).unwrap().gap;
+            for max_iterations in [3, 1, 0] {
+                let design = optimise(&blocks, criterion, &Settings { gap: 0.0, max_iterations }).unwrap();
+                check(&blocks, criterion, &design);
+                assert!(!design.converged && design.iterations == max_iterations && design.gap > best);
+                best = design.gap;
+            }
+        }
+        // Where no step improves any more it ends, too.
+        let endless = optimise(&blocks, Criterion::D, &Settings { gap: 0.0, max_iterations: 10_000 }).unwrap();
+        assert!(endless.gap < 1e-9);
+    }
+
+    #[test]
+    fn further_candidates_are_judged() {
+        let (blocks, _) = pool(300, 0.5, true, 6);
+        let (mut first, mut rest) = (Blocks::new(36, 6), Blocks::new(36, 6));
+        blocks.iter().take(100).for_each(|block| first.push(block));
+        blocks.iter().skip(100).for_each(|block| rest.push(block));
+        let design = converged(&first, Criterion::D, &CLOSE);
+        let largest = design.sensitivities(Criterion::D, &rest).into_iter().fold(0.0, f64::max);
+        assert!(largest > 1.0 + design.gap);
+        let all = converged(&blocks, Criterion::D, &CLOSE);
+        assert!(all.value > design.value && all.value <= design.value + 36.0 * largest.ln());
+    }
+
+    #[test]
+    fn pools_and_matrices_that_make_no_sense_are_refused() {
+        let (blocks, _) = pool(5, 1.0, true, 6);
+        let refused = |blocks: &Blocks, criterion| optimise(blocks, criterion, &Settings::default()).unwrap_err();
+        assert_eq!(refused(&blocks, Criterion::D), ApproximateError::RankDeficient { candidates: 5, rank: 30, columns: 36 });
+        assert_eq!(
+            refused(&Blocks::new(3, 2), Criterion::D),
+            ApproximateError::RankDeficient { candidates: 0, rank: 0, columns: 3 }
+        );
+        let points = [0.5, 0.5, 0.5, -0.5];
+        assert_eq!(
+            refused(&polynomial(2, &points), Criterion::D),
+            ApproximateError::RankDeficient { candidates: 4, rank: 2, columns: 3 }
+        );
+        assert_eq!(refused(&polynomial(1, &[0.0, f64::NAN]), Criterion::D), ApproximateError::NotFinite);
+        let line = polynomial(1, &[0.0, 1.0]);
+        assert_eq!(refused(&line, Criterion::L(&[1.0, 0.0, 0.0, f64::INFINITY])), ApproximateError::NotFinite);
+        assert_eq!(refused(&line, Criterion::L(&[1.0, 0.0, 0.0, -0.1])), ApproximateError::NotSemidefinite);
+    }
+}
