@@ -110,9 +110,8 @@ fn climb(
     let drawn = Sampler::new(rules).draw(stream, STARTS)?;
     let members = heaviest.iter().map(|member| &candidates[member * joints..(member + 1) * joints]);
     let mut here: Vec<Vec<f64>> = drawn.chunks_exact(joints).chain(members).map(<[f64]>::to_vec).collect();
-    let sensitivities = |configurations: &[f64]| {
-        design.sensitivities(goal, &Blocks::of(&models.information, configurations, joints))
-    };
+    let sensitivities =
+        |configurations: &[f64]| design.sensitivities(goal, &Blocks::of(&models.information, configurations, joints));
     let mut best = sensitivities(&here.concat());
     let mut scratch = RulesScratch::default();
     for pass in 0..PASSES {

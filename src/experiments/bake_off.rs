@@ -173,11 +173,8 @@ fn contenders(
 ) -> Result<Vec<Contender>, SessionError> {
     let joints = base.arm.joint_count();
     let label = |what: &str| format!("bake_off/{}/{}/{what}", cell.words(), cell.count);
-    let pairs: Vec<(Method, Criterion)> = settings
-        .methods
-        .iter()
-        .flat_map(|method| settings.criteria.iter().map(|criterion| (*method, *criterion)))
-        .collect();
+    let pairs: Vec<(Method, Criterion)> =
+        settings.methods.iter().flat_map(|method| settings.criteria.iter().map(|criterion| (*method, *criterion))).collect();
     let chosen: Vec<(Option<(Method, Criterion)>, Vec<f64>)> = pairs
         .into_par_iter()
         .map(|(method, criterion)| {

@@ -62,7 +62,8 @@ impl Situation {
             position_sigma_per_m: 6e-6,
             attitude_sigma_rad: (self.sees == Sees::Pose).then_some(0.003 * std::f64::consts::PI / 180.0),
             temperature_sigma_k: None,
-            view: (self.reach == Reach::Cone).then(|| View { towards_in_base: Point3::new(0.4, 0.0, 0.5), half_angle_rad: CONE_RAD }),
+            view: (self.reach == Reach::Cone)
+                .then(|| View { towards_in_base: Point3::new(0.4, 0.0, 0.5), half_angle_rad: CONE_RAD }),
         };
         if self.reach == Reach::Limited {
             limit(&mut scene, LIMITED_RAD);
@@ -82,7 +83,9 @@ impl Situation {
         let thermal = Thermal {
             expansion_per_k: (0..=joints).map(|link| if link == 0 { 12e-6 } else { 23e-6 }).collect(),
             // Most where the large motors are, least at the base and the tool.
-            rise_k: (0..=joints).map(|link| 3.0 + 7.0 * libm::sin(std::f64::consts::PI * link as f64 / (joints + 1) as f64)).collect(),
+            rise_k: (0..=joints)
+                .map(|link| 3.0 + 7.0 * libm::sin(std::f64::consts::PI * link as f64 / (joints + 1) as f64))
+                .collect(),
             profile: ThermalProfile::HeatAndCool,
         };
         Injected {
