@@ -527,6 +527,8 @@ fn what_is_wrong_with_an_arm_from_a_urdf_is_named() {
         (inline.replacen("[sensor]", frame, 1), &["arm.frame", "with convention = \"urdf\"", "remove the key"]),
         (inline.replacen("convention = \"urdf\"", six, 1), &["arm.base", "with convention = \"urdf\"", "the URDF's"]),
         (inline.replacen("[sensor]", "[arm.base_link]\n[sensor]", 1), &["arm.base_link", "where it begins is urdf_base_link"]),
+        (inline.replacen("urdf = '", "base_link = 'foot'\nurdf = '", 1), &["arm.base_link", "did you mean `urdf_base_link`?"]),
+        (inline.replacen("urdf = '", "tip_link = 'nest'\nurdf = '", 1), &["arm.tip_link", "did you mean `urdf_tip_link`?"]),
         (inline.replacen("urdf = '", "urdf_tip = 'nest'\nurdf = '", 1), &["arm.urdf_tip", "did you mean `urdf_tip_link`?"]),
         (PANDA.replacen("urdf_file = \"panda.urdf\"", "urdf = 5", 1), &["arm.urdf", "a string"]),
         (ARM8.replacen("note = ", "urdf_file = \"x\"\nnote = ", 1), &["arm.urdf_file", "with convention = \"mdh5\""]),
