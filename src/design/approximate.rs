@@ -73,7 +73,8 @@ pub struct ApproximateDesign {
     pub iterations: usize,
     /// Whether the gap is the settings' or less.
     pub converged: bool,
-    /// M of these weights (rank × rank, both triangles): the information per pose.
+    /// M of these weights (rank × rank, both triangles): the information per pose. The other numbers are as exact as its condition
+    /// allows.
     pub information: Vec<f64>,
 }
 
@@ -549,7 +550,8 @@ fn search(pool: &Pool, matrix: Option<&[f64]>, settings: &Settings) -> Result<(V
         let information = pool.information(&support, &weights);
         let Some(point) = Point::at(&information, matrix, n) else { break };
         let curvature = point.curvature(n);
-        if !curvature.is_semidefinite() {
+        // Later, where the information may be nearly singular, rounding may look like it.
+        if iterations == 0 && !curvature.is_semidefinite() {
             return Err(ApproximateError::NotSemidefinite);
         }
         let sensitivities = pool.sensitivities(&point.slope);
@@ -971,16 +973,16 @@ mod tests {
 
     #[test]
     fn what_only_some_parameters_matter_for_has_a_design_as_well() {
-        // Variance of the slope at 0 and of a prediction at 1: rank one, the information of the optimum is singular or nearly so.
-        let points = grid(100);
-        let blocks = polynomial(3, &points);
-        for direction in [[0.0, 1.0, 0.0, 0.0], [1.0, 1.0, 1.0, 1.0]] {
+        // Variance of the slope at 0 (Chebyshev: 9 with the weight at the extremes of his polynomial), and of the prediction at 1,
+        // for which nothing but 1 need be measured: the information of the optimum is singular.
+        let blocks = polynomial(3, &grid(100));
+        for (direction, best) in [([0.0, 1.0, 0.0, 0.0], 9.0), ([1.0, 1.0, 1.0, 1.0], 1.0)] {
             let matrix: Vec<f64> = (0..16).map(|at| direction[at / 4] * direction[at % 4]).collect();
             let design = optimise(&blocks, Criterion::L(&matrix), &Settings::default()).unwrap();
-            check(&blocks, Criterion::L(&matrix), &design);
-            eprintln!("{} {} {} {}", design.gap, design.iterations, design.value, design.bound);
+            assert!(design.converged && (design.value / best - 1.0).abs() < 1e-3, "{} {}", design.value, design.gap);
+            assert!(design.bound < best * (1.0 + 1e-6));
         }
-        let nothing = converged(&blocks, Criterion::L(&[0.0; 16]), &CLOSE);
+        let nothing = optimise(&blocks, Criterion::L(&[0.0; 16]), &CLOSE).unwrap();
         assert_eq!((nothing.value, nothing.bound, nothing.gap), (0.0, 0.0, 0.0));
     }
 
