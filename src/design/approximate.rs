@@ -4,9 +4,9 @@
 //! Candidate i has a block Xᵢ ([`Blocks`]), a design weights w ≥ 0 that add up to one, and the information per pose M(w) =
 //! Σ wᵢ XᵢᵀXᵢ. Both criteria are convex, and both have one number per candidate, its sensitivity sᵢ, whose weighted mean is known
 //! and whose largest value bounds the optimum: for D the dᵢ = tr(Xᵢ M⁻¹ Xᵢᵀ) with Σ wᵢ dᵢ = rank (Kiefer and Wolfowitz, "The
-//! equivalence of two extremum problems", Canadian Journal of Mathematics 12, 1960, theorem 1; for blocks Fedorov, "Theory of
-//! Optimal Experiments", 1972, theorem 5.2.1), for L the φᵢ = tr(Xᵢ M⁻¹ L M⁻¹ Xᵢᵀ) with Σ wᵢ φᵢ = tr(L M⁻¹) (Fedorov, 1972,
-//! theorem 2.9.2). The gap is `max sᵢ / Σ wᵢ sᵢ − 1`, and a design is optimal if and only if it is zero.
+//! equivalence of two extremum problems", Canadian Journal of Mathematics 12, 1960; for blocks Fedorov, "Theory of Optimal
+//! Experiments", 1972, chapter 5), for L the φᵢ = tr(Xᵢ M⁻¹ L M⁻¹ Xᵢᵀ) with Σ wᵢ φᵢ = tr(L M⁻¹) (Fedorov, 1972,
+//! section 2.9). The gap is `max sᵢ / Σ wᵢ sᵢ − 1`, and a design of invertible M is optimal if it is zero.
 //!
 //! **Gap for D.** Let M\* be optimal and λ the r eigenvalues of M⁻¹M\*. By the inequality of the means, (det M\*/det M)^(1/r) =
 //! (Π λ)^(1/r) ≤ Σ λ / r = Σ w\*ᵢ dᵢ / r ≤ max dᵢ / r = 1 + gap. Therefore log det M\* ≤ log det M + r log(1 + gap), which is tighter
@@ -73,7 +73,8 @@ pub struct ApproximateDesign {
     pub iterations: usize,
     /// Whether the gap is the settings' or less.
     pub converged: bool,
-    /// M of these weights (rank × rank, both triangles): the information per pose.
+    /// M of these weights (rank × rank, both triangles): the information per pose. The other numbers are as exact as its condition
+    /// allows.
     pub information: Vec<f64>,
 }
 
@@ -450,12 +451,12 @@ impl Point {
     }
 
     /// How the criterion bends: tr(GᵢGⱼ) for D, 2 tr(Λ GᵢGⱼ) = Σ (λₖ + λₗ) Gᵢₖₗ Gⱼₖₗ for L, in coordinates where the information
-    /// is the identity and L is diagonal, Λ.
-    fn curvature(&self, n: usize) -> Curvature {
+    /// is the identity and L is diagonal, Λ. None where its eigenvalues are not found.
+    fn curvature(&self, n: usize) -> Option<Curvature> {
         let (transform, eigenvalues) = match &self.matrix {
             None => (self.whitening.clone(), None),
             Some(matrix) => {
-                let eigen = SymmetricEigen::new(DMatrix::from_row_slice(n, n, matrix));
+                let eigen = SymmetricEigen::try_new(DMatrix::from_row_slice(n, n, matrix), f64::EPSILON, 100 * n)?;
                 // nalgebra stores columns.
                 let vectors = transposed(eigen.eigenvectors.as_slice(), n);
                 let mut transform = vec![0.0; n * n];
@@ -463,7 +464,7 @@ impl Point {
                 (transform, Some(eigen.eigenvalues.as_slice().to_vec()))
             }
         };
-        Curvature { transform, eigenvalues }
+        Some(Curvature { transform, eigenvalues })
     }
 }
 
@@ -548,8 +549,9 @@ fn search(pool: &Pool, matrix: Option<&[f64]>, settings: &Settings) -> Result<(V
     loop {
         let information = pool.information(&support, &weights);
         let Some(point) = Point::at(&information, matrix, n) else { break };
-        let curvature = point.curvature(n);
-        if !curvature.is_semidefinite() {
+        let Some(curvature) = point.curvature(n) else { break };
+        // Later, where the information may be nearly singular, rounding may look like it.
+        if iterations == 0 && !curvature.is_semidefinite() {
             return Err(ApproximateError::NotSemidefinite);
         }
         let sensitivities = pool.sensitivities(&point.slope);
@@ -971,16 +973,16 @@ mod tests {
 
     #[test]
     fn what_only_some_parameters_matter_for_has_a_design_as_well() {
-        // Variance of the slope at 0 and of a prediction at 1: rank one, the information of the optimum is singular or nearly so.
-        let points = grid(100);
-        let blocks = polynomial(3, &points);
-        for direction in [[0.0, 1.0, 0.0, 0.0], [1.0, 1.0, 1.0, 1.0]] {
+        // Variance of the slope at 0 (Chebyshev: 9 with the weight at the extremes of his polynomial), and of the prediction at 1,
+        // for which nothing but 1 need be measured: the information of the optimum is singular.
+        let blocks = polynomial(3, &grid(100));
+        for (direction, best) in [([0.0, 1.0, 0.0, 0.0], 9.0), ([1.0, 1.0, 1.0, 1.0], 1.0)] {
             let matrix: Vec<f64> = (0..16).map(|at| direction[at / 4] * direction[at % 4]).collect();
             let design = optimise(&blocks, Criterion::L(&matrix), &Settings::default()).unwrap();
-            check(&blocks, Criterion::L(&matrix), &design);
-            eprintln!("{} {} {} {}", design.gap, design.iterations, design.value, design.bound);
+            assert!(design.converged && (design.value / best - 1.0).abs() < 1e-3, "{} {}", design.value, design.gap);
+            assert!(design.bound < best * (1.0 + 1e-6));
         }
-        let nothing = converged(&blocks, Criterion::L(&[0.0; 16]), &CLOSE);
+        let nothing = optimise(&blocks, Criterion::L(&[0.0; 16]), &CLOSE).unwrap();
         assert_eq!((nothing.value, nothing.bound, nothing.gap), (0.0, 0.0, 0.0));
     }
 
