@@ -1,9 +1,11 @@
 //! Choosing the configurations to measure.
 
+pub mod annealing;
 pub mod best_of_random;
 pub mod candidates;
 pub mod coordinate_exchange;
 pub mod detmax;
+mod moves;
 pub mod objective;
 pub mod outcome;
 mod pool;

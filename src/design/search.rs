@@ -187,6 +187,7 @@ pub fn search(
         Method::Pso => super::swarm::search(task, swarm, stream, watch),
         Method::BestOfRandom => super::best_of_random::search(task, stream, watch),
         Method::CoordinateExchange => super::coordinate_exchange::search(task, stream, watch),
+        Method::Annealing => super::annealing::search(task, stream, watch),
         Method::Detmax => super::detmax::search(task, stream, watch),
         _ => {
             let configurations = task.draw(stream, task.count)?;
