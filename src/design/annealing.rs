@@ -6,7 +6,7 @@
 //! one that takes four of five of the first worse moves, so that it is in the criterion's own unit; it falls geometrically with
 //! what is spent of the budget. The best set is kept, wherever the search goes from it.
 
-use super::moves::{Record, fresh, near, or_worst};
+use super::moves::{Record, fresh, knob, near, or_worst};
 use super::objective::Set;
 use super::outcome::StopReason;
 use super::search::{Found, Scratch, SearchError, Task, Watch};
@@ -55,12 +55,12 @@ pub fn search(task: &Task<'_>, stream: &mut Stream, watch: &mut Watch<'_>) -> Re
             losses.push(loss);
         }
     }
-    let first = first_temperature(&losses);
+    let first = knob("SA_A", 1.0) * first_temperature(&losses);
     let start = task.evaluations();
     let length = task.left().max(1) as f64;
     while task.left() > 0 {
         let progress = (task.evaluations() - start) as f64 / length;
-        let temperature = first * libm::pow(LAST_TEMPERATURE, progress);
+        let temperature = first * libm::pow(knob("SA_T1", LAST_TEMPERATURE), progress);
         let index = stream.index(task.count);
         let moved = propose(task, set.get(index), progress, stream, &mut scratch, &mut trial)?;
         let chance = stream.unit();
@@ -89,12 +89,13 @@ fn propose(
     scratch: &mut Scratch,
     out: &mut Vec<f64>,
 ) -> Result<bool, SearchError> {
-    if stream.unit() < FRESH * (1.0 - progress) {
+    if stream.unit() < knob("SA_F", FRESH) * (1.0 - progress) {
         fresh(task, stream, out)?;
         return Ok(true);
     }
-    let step = FIRST_STEP * libm::pow(LAST_STEP / FIRST_STEP, progress);
-    Ok(near(task, joints, step, SHARE, stream, scratch, out))
+    let (a, b) = (knob("SA_S0", FIRST_STEP), knob("SA_S1", LAST_STEP));
+    let step = a * libm::pow(b / a, progress);
+    Ok(near(task, joints, step, knob("SA_SH", SHARE), stream, scratch, out))
 }
 
 /// The temperature at which moves with these `losses` are taken with probability [`FIRST_ACCEPTANCE`] on average; zero (no worse
