@@ -6,7 +6,7 @@
 //! one that takes four of five of the first worse moves, so that it is in the criterion's own unit; it falls geometrically with
 //! what is spent of the budget. The best set is kept, wherever the search goes from it.
 
-use super::moves::{Record, fresh, knob, near, or_worst};
+use super::moves::{Record, fresh, near, or_worst};
 use super::objective::Set;
 use super::outcome::StopReason;
 use super::search::{Found, Scratch, SearchError, Task, Watch};
@@ -19,13 +19,13 @@ const TRIAL_SHARE: f64 = 0.05;
 /// Share of the worse moves that the first temperature takes.
 const FIRST_ACCEPTANCE: f64 = 0.8;
 /// Last temperature as a share of the first.
-const LAST_TEMPERATURE: f64 = 1e-3;
+const LAST_TEMPERATURE: f64 = 3e-4;
 /// Step of a joint at the first temperature, as a share of its range (standard deviation).
 const FIRST_STEP: f64 = 0.3;
 /// The same at the last.
 const LAST_STEP: f64 = 0.03;
 /// Probability of a joint of the changed configuration to move.
-const SHARE: f64 = 0.3;
+const SHARE: f64 = 0.2;
 /// Probability of a new random configuration at the first temperature; it falls to zero with the budget.
 const FRESH: f64 = 0.2;
 
@@ -55,12 +55,12 @@ pub fn search(task: &Task<'_>, stream: &mut Stream, watch: &mut Watch<'_>) -> Re
             losses.push(loss);
         }
     }
-    let first = knob("SA_A", 1.0) * first_temperature(&losses);
+    let first = first_temperature(&losses);
     let start = task.evaluations();
     let length = task.left().max(1) as f64;
     while task.left() > 0 {
         let progress = (task.evaluations() - start) as f64 / length;
-        let temperature = first * libm::pow(knob("SA_T1", LAST_TEMPERATURE), progress);
+        let temperature = first * libm::pow(LAST_TEMPERATURE, progress);
         let index = stream.index(task.count);
         let moved = propose(task, set.get(index), progress, stream, &mut scratch, &mut trial)?;
         let chance = stream.unit();
@@ -89,13 +89,12 @@ fn propose(
     scratch: &mut Scratch,
     out: &mut Vec<f64>,
 ) -> Result<bool, SearchError> {
-    if stream.unit() < knob("SA_F", FRESH) * (1.0 - progress) {
+    if stream.unit() < FRESH * (1.0 - progress) {
         fresh(task, stream, out)?;
         return Ok(true);
     }
-    let (a, b) = (knob("SA_S0", FIRST_STEP), knob("SA_S1", LAST_STEP));
-    let step = a * libm::pow(b / a, progress);
-    Ok(near(task, joints, step, knob("SA_SH", SHARE), stream, scratch, out))
+    let step = FIRST_STEP * libm::pow(LAST_STEP / FIRST_STEP, progress);
+    Ok(near(task, joints, step, SHARE, stream, scratch, out))
 }
 
 /// The temperature at which moves with these `losses` are taken with probability [`FIRST_ACCEPTANCE`] on average; zero (no worse
@@ -109,7 +108,7 @@ fn first_temperature(losses: &[f64]) -> f64 {
     // The mean over the losses of exp(−loss/T), brought to the share wanted (Ben-Ameur 2004).
     for _ in 0..20 {
         let taken = losses.iter().map(|loss| libm::exp(-loss / temperature)).sum::<f64>() / count;
-        temperature *= libm::log(taken) / libm::log(FIRST_ACCEPTANCE);
+        temperature *= (libm::log(taken) / libm::log(FIRST_ACCEPTANCE)).clamp(0.1, 10.0);
     }
     temperature
 }

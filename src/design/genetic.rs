@@ -5,27 +5,27 @@
 //! tournaments. A child's configurations are then moved a little or drawn anew, each with a small probability, by steps that shrink
 //! with the budget. The best of a generation live on beside its children.
 
-use super::moves::{Record, fresh, near, or_worst, knob};
+use super::moves::{Record, fresh, near, or_worst};
 use super::outcome::StopReason;
 use super::search::{Found, Scratch, SearchError, Task, Watch};
 use crate::seed::Stream;
 
 /// Sets of a generation.
-const POPULATION: usize = 30;
+const POPULATION: u64 = 20;
 /// Share of a generation that lives on, the best first.
-const ELITE: f64 = 0.3;
+const ELITE: f64 = 0.5;
 /// Sets of which a parent is the best.
-const TOURNAMENT: usize = 2;
+const TOURNAMENT: usize = 3;
 /// Probability of a child to have two parents.
-const CROSSOVER: f64 = 0.8;
+const CROSSOVER: f64 = 0.5;
 /// Configurations of a child that are changed, on average.
-const MUTATIONS: f64 = 2.0;
+const MUTATIONS: f64 = 1.0;
 /// Share of these that are drawn anew.
-const FRESH: f64 = 0.2;
+const FRESH: f64 = 0.1;
 /// Probability of a joint of a configuration that is moved to move.
 const SHARE: f64 = 0.3;
 /// Step of a joint at the start, as a share of its range (standard deviation).
-const FIRST_STEP: f64 = 0.25;
+const FIRST_STEP: f64 = 0.15;
 /// The same at the end.
 const LAST_STEP: f64 = 0.03;
 
@@ -64,7 +64,7 @@ impl<'t, 'a> Population<'t, 'a> {
     /// # Errors
     /// If no configuration may be measured.
     pub(super) fn draw(task: &'t Task<'a>, count: usize, stream: &mut Stream) -> Result<Self, SearchError> {
-        let size = (knob("GA_P", POPULATION as f64) as u64).min(task.left()).max(1);
+        let size = POPULATION.min(task.left()).max(1);
         let sets = (0..size).map(|_| task.draw(stream, count)).collect::<Result<Vec<_>, _>>()?;
         let values = values(task, &sets);
         let mut population = Population { task, sets, values, scratch: Scratch::default() };
@@ -72,7 +72,7 @@ impl<'t, 'a> Population<'t, 'a> {
         Ok(population)
     }
 
-    /// The best set, with each configuration as often as the task's size asks for, and its value.
+    /// The best set and its value.
     pub(super) fn best(&self) -> (&[f64], f64) {
         (&self.sets[0], self.values[0])
     }
@@ -98,13 +98,13 @@ impl<'t, 'a> Population<'t, 'a> {
     /// If no configuration may be measured.
     pub(super) fn breed(&mut self, task: &Task<'_>, progress: f64, stream: &mut Stream) -> Result<(), SearchError> {
         let size = self.sets.len();
-        let elite = ((knob("GA_E", ELITE) * size as f64) as usize).max(1);
+        let elite = ((ELITE * size as f64) as usize).max(1);
         let children = (size - elite).max(1).min(usize::try_from(task.left()).unwrap_or(usize::MAX));
-        let step = knob("GA_S0", FIRST_STEP) * libm::pow(knob("GA_S1", LAST_STEP) / knob("GA_S0", FIRST_STEP), progress.min(1.0));
+        let step = FIRST_STEP * libm::pow(LAST_STEP / FIRST_STEP, progress.min(1.0));
         let mut sets = Vec::with_capacity(children);
         for _ in 0..children {
             let mother = self.winner(stream);
-            let (mut child, crossed) = if stream.unit() < knob("GA_X", CROSSOVER) {
+            let (mut child, crossed) = if stream.unit() < CROSSOVER {
                 let father = self.winner(stream);
                 (self.cross(mother, father, stream), mother != father)
             } else {
@@ -114,8 +114,9 @@ impl<'t, 'a> Population<'t, 'a> {
             sets.push(child);
         }
         let values = values(task, &sets);
-        self.sets.truncate(elite.max(size - children));
-        self.values.truncate(elite.max(size - children));
+        let survivors = elite.max(size - children);
+        self.sets.truncate(survivors);
+        self.values.truncate(survivors);
         self.sets.extend(sets);
         self.values.extend(values);
         self.sort();
@@ -126,7 +127,7 @@ impl<'t, 'a> Population<'t, 'a> {
 
     /// The best of a few random sets.
     fn winner(&self, stream: &mut Stream) -> usize {
-        (0..knob("GA_T", TOURNAMENT as f64) as usize).map(|_| stream.index(self.sets.len())).min().unwrap_or(0)
+        (0..TOURNAMENT).map(|_| stream.index(self.sets.len())).min().unwrap_or(0)
     }
 
     /// A random share of `mother`'s configurations and the rest from `father`, none twice as far as they go.
@@ -168,13 +169,13 @@ impl<'t, 'a> Population<'t, 'a> {
         let chosen = stream.index(count);
         let mut out = Vec::new();
         for (index, configuration) in child.chunks_exact_mut(joints).enumerate() {
-            if !(stream.unit() < knob("GA_M", MUTATIONS) / count as f64 || (sure && index == chosen)) {
+            if !(stream.unit() < MUTATIONS / count as f64 || (sure && index == chosen)) {
                 continue;
             }
-            if stream.unit() < knob("GA_F", FRESH) {
+            if stream.unit() < FRESH {
                 fresh(self.task, stream, &mut out)?;
                 configuration.copy_from_slice(&out);
-            } else if near(self.task, configuration, step, knob("GA_SH", SHARE), stream, &mut self.scratch, &mut out) {
+            } else if near(self.task, configuration, step, SHARE, stream, &mut self.scratch, &mut out) {
                 configuration.copy_from_slice(&out);
             }
         }
@@ -198,6 +199,7 @@ pub(super) fn repeated(set: &[f64], task: &Task<'_>) -> Vec<f64> {
 /// Values of `sets` with repetitions, side by side.
 pub(super) fn values(task: &Task<'_>, sets: &[Vec<f64>]) -> Vec<f64> {
     let whole = sets.first().is_none_or(|set| set.len() == task.count * task.arm().joint_count());
-    let values = if whole { task.values(sets) } else { task.values(&sets.iter().map(|set| repeated(set, task)).collect::<Vec<_>>()) };
+    let values =
+        if whole { task.values(sets) } else { task.values(&sets.iter().map(|set| repeated(set, task)).collect::<Vec<_>>()) };
     values.into_iter().map(or_worst).collect()
 }

@@ -4,22 +4,22 @@
 //! The set of m consists of n different configurations, repeated as evenly as possible, where n is little more than what it takes
 //! to determine the parameters. That makes the search small: n rather than m configurations are looked for, by the genetic
 //! algorithm of [`super::genetic`], and the best of them is polished along the numerical gradient over its joints, projected on the
-//! limits, the step told by trying several side by side. While budget is left, both begin again from other random sets.
+//! limits, along conjugate directions and with the step told by trying several lengths side by side. While budget is left, both begin again from other random sets.
 //!
 //! Repetition is what Wu et al. claim to be cheap, and what Chen et al. 2019 criticise as prone to singular Jacobians; and a
 //! criterion that looks at end points gains nothing from measuring at one twice. Where n is m, this is a genetic algorithm with
 //! gradient search.
 
 use super::genetic::{Population, repeated, values};
-use super::moves::{Record, knob};
+use super::moves::Record;
 use super::outcome::StopReason;
 use super::search::{Found, Scratch, SearchError, Task, Watch};
 use crate::seed::Stream;
 
 /// Configurations more than the parameters need.
-const MARGIN: usize = 2;
+const MARGIN: usize = 3;
 /// Share of what is left that the genetic algorithm spends before the gradient search.
-const BREEDING: f64 = 0.4;
+const BREEDING: f64 = 0.3;
 /// Step of the numerical derivative, as a share of a joint's range.
 const DIFFERENCE: f64 = 1e-4;
 /// First length of a step along the gradient: that of the joint that moves most, as a share of its range.
@@ -41,7 +41,7 @@ pub fn search(task: &Task<'_>, stream: &mut Stream, watch: &mut Watch<'_>) -> Re
     let mut here = f64::NEG_INFINITY;
     while task.left() > 0 || record.configurations().is_empty() {
         let start = task.evaluations();
-        let length = (task.left() as f64 * knob("GR_B", BREEDING)).max(1.0);
+        let length = (task.left() as f64 * BREEDING).max(1.0);
         let progress = || (task.evaluations() - start) as f64 / length;
         let mut population = Population::draw(task, count, stream)?;
         population.offer(&mut record);
@@ -61,7 +61,7 @@ pub fn search(task: &Task<'_>, stream: &mut Stream, watch: &mut Watch<'_>) -> Re
 fn distinct(task: &Task<'_>) -> usize {
     let model = &task.objective.models().information;
     let needed = model.rank().div_ceil(model.rows_per_pose());
-    task.count.min(needed + knob("GR_N", MARGIN as f64) as usize)
+    task.count.min(needed + MARGIN)
 }
 
 /// Follows the gradient from `set` until that brings nothing; the value it gets to.
@@ -80,11 +80,8 @@ fn climb(
         let gradient = gradient(task, &set, value, &mut scratch);
         // Conjugate directions (Polak and Ribière), from the gradient itself where they would lead down.
         let square = dot(&gradient_before, &gradient_before);
-        let share = if square > 0.0 && knob("GR_CG", 1.0) > 0.0 {
-            ((dot(&gradient, &gradient) - dot(&gradient, &gradient_before)) / square).max(0.0)
-        } else {
-            0.0
-        };
+        let share =
+            if square > 0.0 { ((dot(&gradient, &gradient) - dot(&gradient, &gradient_before)) / square).max(0.0) } else { 0.0 };
         direction = if direction.is_empty() {
             gradient.clone()
         } else {

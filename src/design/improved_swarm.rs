@@ -13,7 +13,7 @@
 
 use rayon::prelude::*;
 
-use super::moves::{Record, fresh, or_worst, reflect, knob};
+use super::moves::{Record, fresh, or_worst, reflect};
 use super::outcome::StopReason;
 use super::search::{Found, Scratch, SearchError, Task, Watch};
 use crate::arm::Arm;
@@ -35,7 +35,7 @@ const PATIENCE: usize = 10;
 /// Configurations that are then drawn anew, as a share of the set.
 const MUTATED: f64 = 0.05;
 
-/// A set on its way.
+/// A set on its way. Its best is the best that it has been.
 struct Particle {
     position: Vec<f64>,
     velocity: Vec<f64>,
@@ -43,9 +43,13 @@ struct Particle {
     best_position: Vec<f64>,
     best: f64,
     idle: usize,
-    /// Draws of σ and η for every joint, then of whether a configuration moves.
+    /// σ and η of every joint.
     draws: Vec<f64>,
+    /// The swarm's best, in the order of the own configurations.
     target: Vec<f64>,
+    /// Memory for that order.
+    pairs: Vec<(f64, usize, usize)>,
+    /// Memory.
     scratch: Scratch,
 }
 
@@ -60,12 +64,11 @@ pub fn search(task: &Task<'_>, settings: &Swarm, stream: &mut Stream, watch: &mu
     let mut record = Record::new(task);
     let size = settings.particles.min(usize::try_from(task.left()).unwrap_or(usize::MAX)).max(1);
     let mut particles = Vec::with_capacity(size);
-    let fastest = knob("IP_V", FASTEST);
     for _ in 0..size {
         let position = task.draw(stream, task.count)?;
         let velocity = (0..task.count)
             .flat_map(|_| limits.iter())
-            .map(|limit| fastest * (limit.upper - limit.lower) * stream.uniform(-1.0, 1.0))
+            .map(|limit| FASTEST * (limit.upper - limit.lower) * stream.uniform(-1.0, 1.0))
             .collect();
         particles.push(Particle {
             best_position: position.clone(),
@@ -76,6 +79,7 @@ pub fn search(task: &Task<'_>, settings: &Swarm, stream: &mut Stream, watch: &mu
             idle: 0,
             draws: Vec::new(),
             target: Vec::new(),
+            pairs: Vec::new(),
             scratch: Scratch::default(),
         });
     }
@@ -88,15 +92,12 @@ pub fn search(task: &Task<'_>, settings: &Swarm, stream: &mut Stream, watch: &mu
     while task.left() > 0 {
         let progress = (task.evaluations() - start) as f64 / length;
         let between = |[first, last]: [f64; 2]| first + (last - first) * progress;
-        let w = between([knob("IP_W0", INERTIA[0]), knob("IP_W1", INERTIA[1])]);
-        let c1 = between([knob("IP_A0", OWN[0]), knob("IP_A1", OWN[1])]);
-        let c2 = between([knob("IP_B0", SWARM[0]), knob("IP_B1", SWARM[1])]);
-        let pull = [w, c1, c2];
+        let pull = [INERTIA, OWN, SWARM].map(between);
         let moving = size.min(usize::try_from(task.left()).unwrap_or(usize::MAX));
         for particle in &mut particles[..moving] {
             particle.draws.clear();
-            particle.draws.extend((0..2 * particle.position.len() + task.count).map(|_| stream.unit()));
-            if particle.idle >= knob("IP_P", PATIENCE as f64) as usize {
+            particle.draws.extend((0..2 * particle.position.len()).map(|_| stream.unit()));
+            if particle.idle >= PATIENCE {
                 particle.mutate(task, stream)?;
             }
         }
@@ -111,6 +112,7 @@ pub fn search(task: &Task<'_>, settings: &Swarm, stream: &mut Stream, watch: &mu
     record.end(mean(&particles), StopReason::BudgetSpent, watch)
 }
 
+/// Offers every particle's best.
 fn offer(particles: &[Particle], record: &mut Record<'_, '_>) {
     particles.iter().for_each(|particle| record.offer(&particle.best_position, particle.best));
 }
@@ -140,7 +142,7 @@ impl Particle {
         self.position.copy_from_slice(&self.best_position);
         self.velocity.fill(0.0);
         let mut drawn = Vec::new();
-        for _ in 0..((knob("IP_MU", MUTATED) * task.count as f64) as usize).max(1) {
+        for _ in 0..((MUTATED * task.count as f64) as usize).max(1) {
             let start = stream.index(task.count) * joints;
             fresh(task, stream, &mut drawn)?;
             self.position[start..start + joints].copy_from_slice(&drawn);
@@ -152,19 +154,13 @@ impl Particle {
     /// Moves by inertia and by what the particle's own best and that of the swarm (`leader`) pull.
     fn step(&mut self, task: &Task<'_>, [inertia, own, swarm]: [f64; 3], leader: &[f64]) {
         let limits = &task.arm().chain.joints;
-        if knob("IP_MATCH", 1.0) > 0.0 {
-        assign(task.arm(), &self.position, leader, &mut self.target);
-        } else { self.target = leader.to_vec(); }
-        let fastest_share = knob("IP_V", FASTEST);
-        let mask = knob("IP_MASK", 1.0);
+        assign(task.arm(), &self.position, leader, &mut self.pairs, &mut self.target);
         let mut candidate = vec![0.0; limits.len()];
-        let places = self.position.len();
-        for (index, start) in (0..places).step_by(limits.len()).enumerate() {
-            if self.draws[2 * places + index] >= mask { continue; }
+        for start in (0..self.position.len()).step_by(limits.len()) {
             for (offset, limit) in limits.iter().enumerate() {
                 let at = start + offset;
                 let position = self.position[at];
-                let fastest = fastest_share * (limit.upper - limit.lower);
+                let fastest = FASTEST * (limit.upper - limit.lower);
                 let velocity = inertia * self.velocity[at]
                     + own * self.draws[2 * at] * (self.best_position[at] - position)
                     + swarm * self.draws[2 * at + 1] * (self.target[at] - position);
@@ -186,12 +182,12 @@ impl Particle {
 }
 
 /// Writes the configurations of `leader` to `target` in the order that puts each near one of `set`: the nearest pairs first.
-fn assign(arm: &Arm, set: &[f64], leader: &[f64], target: &mut Vec<f64>) {
+fn assign(arm: &Arm, set: &[f64], leader: &[f64], pairs: &mut Vec<(f64, usize, usize)>, target: &mut Vec<f64>) {
     let limits = &arm.chain.joints;
     let joints = limits.len();
     let count = set.len() / joints;
     let over: Vec<f64> = limits.iter().map(|limit| 1.0 / (limit.upper - limit.lower).max(f64::MIN_POSITIVE)).collect();
-    let mut pairs = Vec::with_capacity(count * count);
+    pairs.clear();
     for (i, one) in set.chunks_exact(joints).enumerate() {
         for (j, other) in leader.chunks_exact(joints).enumerate() {
             let square: f64 = one.iter().zip(other).zip(&over).map(|((a, b), over)| (a - b) * (a - b) * over * over).sum();
@@ -202,7 +198,7 @@ fn assign(arm: &Arm, set: &[f64], leader: &[f64], target: &mut Vec<f64>) {
     target.clear();
     target.resize(set.len(), 0.0);
     let (mut placed, mut taken) = (vec![false; count], vec![false; count]);
-    for (_, i, j) in pairs {
+    for &(_, i, j) in pairs.iter() {
         if !placed[i] && !taken[j] {
             (placed[i], taken[j]) = (true, true);
             target[i * joints..(i + 1) * joints].copy_from_slice(&leader[j * joints..(j + 1) * joints]);

@@ -15,6 +15,8 @@ pub mod perturbation;
 mod pool;
 pub mod search;
 pub mod swarm;
+#[cfg(test)]
+mod tests;
 
 use rayon::prelude::*;
 

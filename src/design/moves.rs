@@ -133,7 +133,3 @@ pub(super) fn spread(values: &[f64]) -> f64 {
 pub(super) fn or_worst(value: f64) -> f64 {
     value.max(f64::NEG_INFINITY)
 }
-
-pub(super) fn knob(name: &str, default: f64) -> f64 {
-    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
-}
