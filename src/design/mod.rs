@@ -1,17 +1,25 @@
 //! Choosing the configurations to measure.
 
 pub mod advice;
+pub mod annealing;
 pub mod approximate;
 pub mod best_of_random;
 pub mod bound;
 pub mod candidates;
 pub mod coordinate_exchange;
 pub mod detmax;
+pub mod genetic;
+pub mod genetic_repeated;
+pub mod improved_swarm;
+mod moves;
 pub mod objective;
 pub mod outcome;
+pub mod perturbation;
 mod pool;
 pub mod search;
 pub mod swarm;
+#[cfg(test)]
+mod tests;
 
 use rayon::prelude::*;
 

@@ -187,8 +187,13 @@ pub fn search(
         Method::Pso => super::swarm::search(task, swarm, stream, watch),
         Method::BestOfRandom => super::best_of_random::search(task, stream, watch),
         Method::CoordinateExchange => super::coordinate_exchange::search(task, stream, watch),
+        Method::Annealing => super::annealing::search(task, stream, watch),
         Method::Detmax => super::detmax::search(task, stream, watch),
-        _ => {
+        Method::ImprovedPso => super::improved_swarm::search(task, swarm, stream, watch),
+        Method::Genetic => super::genetic::search(task, stream, watch),
+        Method::GeneticRepeated => super::genetic_repeated::search(task, stream, watch),
+        Method::Perturbation => super::perturbation::search(task, stream, watch),
+        Method::Random => {
             let configurations = task.draw(stream, task.count)?;
             let value = task.value(&configurations, &mut Scratch::default());
             watch(task.step(0, value, value, Some(&configurations)))?;
