@@ -3,9 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::event::Start;
-use crate::design::outcome::{
-    Advice, DesignOutcome, EvennessDomains, RandomReference, SearchStep, StopReason, SwarmIteration,
-};
+use crate::design::outcome::{Advice, DesignOutcome, EvennessDomains, RandomReference, SearchStep, StopReason, SwarmIteration};
 use crate::identification::outcome::Identification;
 use crate::measurement::Measurement;
 use crate::quality::Indexes;

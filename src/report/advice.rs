@@ -142,9 +142,15 @@ mod tests {
     fn a_gain_is_told_in_random_configurations() {
         let text = text(Some(0.05), Some(0.04), 0.03);
         for expected in [
-            "random, mean of 28 sets", "2 of 30 random sets", "0.0450 … 0.0550", "gains 20.0 % of the 40.0 % that are possible",
+            "random, mean of 28 sets",
+            "2 of 30 random sets",
+            "0.0450 … 0.0550",
+            "gains 20.0 % of the 40.0 % that are possible",
             // 40 · (5/4)² = 62.5, to even.
-            "about 62 random configurations", "no choice of 40 can do better than", "noise alone", "1000 random candidates",
+            "about 62 random configurations",
+            "no choice of 40 can do better than",
+            "noise alone",
+            "1000 random candidates",
         ] {
             assert!(text.contains(expected), "{expected}: {text}");
         }

@@ -195,9 +195,8 @@ fn tree(parts: Parts, camera: Camera) -> Node {
             plot("ω, c1, c2", &["/swarm/coefficients/**"], true),
         ])
     };
-    let search = |words: Words| {
-        tabs(vec![plot(&capital(words.quantity()), &["/search/criterion/**"], true), effort("/search/effort/**")])
-    };
+    let search =
+        |words: Words| tabs(vec![plot(&capital(words.quantity()), &["/search/criterion/**"], true), effort("/search/effort/**")]);
     let position = error_chart("Position error", "/errors/position/**");
     let attitude = error_chart("Attitude error", "/errors/attitude/**");
     let temperatures = plot("Temperatures, °C", &["/temperatures/**"], true);
@@ -213,9 +212,7 @@ fn tree(parts: Parts, camera: Camera) -> Node {
             (4.0, rows(vec![(1.0, residuals()), (1.0, swarm())])),
             (3.0, rows(vec![(2.0, side), (1.0, tabs(vec![position, attitude, temperatures]))])),
         ]),
-        (Choosing::Search(words), false) => {
-            columns(vec![(2.0, rows(vec![(3.0, cell), (2.0, search(words))])), (1.0, side)])
-        }
+        (Choosing::Search(words), false) => columns(vec![(2.0, rows(vec![(3.0, cell), (2.0, search(words))])), (1.0, side)]),
         (Choosing::Search(words), true) => columns(vec![
             (4.0, rows(vec![(10.0, cell), (6.0, search(words))])),
             (4.0, rows(vec![(10.0, residuals()), (6.0, tabs(vec![position, attitude]))])),

@@ -139,12 +139,7 @@ pub struct Viewer {
 /// # Errors
 /// If the viewer that was asked for is not there, or the file cannot be written. [`Target::Auto`] and [`Target::Off`] fail only
 /// for an arm that cannot be drawn.
-pub fn open(
-    target: &Target,
-    arm: &Arm,
-    design: Option<&DesignProblem>,
-    name: &str,
-) -> Result<Option<Viewer>, ViewerError> {
+pub fn open(target: &Target, arm: &Arm, design: Option<&DesignProblem>, name: &str) -> Result<Option<Viewer>, ViewerError> {
     let (destination, sink): (Destination, Box<dyn LogSink>) = match target {
         Target::Off => return Ok(None),
         Target::Auto => {
