@@ -167,7 +167,7 @@ impl<'a> Task<'a> {
 /// A value as it is told. A set that determines nothing has −∞, which JSON cannot hold: [`f64::MIN`] stands for it.
 #[must_use]
 pub fn finite(value: f64) -> f64 {
-    value.max(f64::MIN).min(f64::MAX)
+    value.clamp(f64::MIN, f64::MAX)
 }
 
 /// Splits configurations that stand one after the other.

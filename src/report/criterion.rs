@@ -48,12 +48,18 @@ impl Words {
         }
     }
 
+    /// Whether the quantity falls as the value rises.
+    #[must_use]
+    pub fn falls(self) -> bool {
+        matches!(self.criterion, Some(Criterion::IOptimality | Criterion::GOptimality))
+    }
+
     /// The quantity of a value (as in [`crate::design::outcome::SearchStep::value`]), in the unit that it is told in. Infinite where
     /// a set determines nothing.
     #[must_use]
     pub fn scaled(self, value: f64) -> f64 {
         match self.criterion {
-            Some(Criterion::IOptimality | Criterion::GOptimality) => 1e3 * libm::exp(-0.5 * value),
+            _ if self.falls() => 1e3 * libm::exp(-0.5 * value),
             Some(Criterion::DOptimality) => libm::exp(value),
             _ => value,
         }

@@ -153,7 +153,11 @@ fn scene(name: &str, contents: &[&'static str], camera: Camera) -> Node {
 }
 
 fn plot(name: &str, contents: &[&'static str], legend: bool) -> Node {
-    let legend = PlotLegend::new().with_visible(legend).with_corner(Corner2D::RightBottom);
+    legend_at(Corner2D::RightBottom, name, contents, legend)
+}
+
+fn legend_at(corner: Corner2D, name: &str, contents: &[&'static str], legend: bool) -> Node {
+    let legend = PlotLegend::new().with_visible(legend).with_corner(corner);
     view("TimeSeries", name, contents).with("PlotLegend", legend)
 }
 
