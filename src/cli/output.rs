@@ -32,6 +32,10 @@ pub(crate) fn scene(global: &Global, options: &SceneOptions) -> anyhow::Result<S
     if let Some(seed) = global.seed {
         file.set_seed(seed)?;
     }
+    // Before anything else: a mesh that was skipped or a mass that is not known may be why what follows is refused.
+    for text in &file.scene.urdf_notes {
+        note(global, &format!("note: {text}"));
+    }
     Ok(file)
 }
 

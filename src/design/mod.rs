@@ -1,6 +1,8 @@
 //! Choosing the configurations to measure.
 
+pub mod approximate;
 pub mod best_of_random;
+pub mod bound;
 pub mod candidates;
 pub mod coordinate_exchange;
 pub mod detmax;

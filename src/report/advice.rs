@@ -44,8 +44,10 @@ pub(super) fn section(outcome: &DesignOutcome, advice: &Advice) -> String {
     text.push_str(&sentence(outcome, advice));
     text.push_str(&format!(
         "This is noise alone: play, bending, warming and whatever else the model leaves out come on top, whatever is chosen.\n\
-         The bound is for choices among {} random candidates.\n",
-        advice.bound_candidates
+         The bound rests on {} configurations that were looked at; {} % of the variance are taken off for what they may have \
+         missed.\n",
+        advice.bound_candidates,
+        number(100.0 * advice.bound_gap)
     ));
     text
 }
@@ -150,7 +152,8 @@ mod tests {
             "about 62 random configurations",
             "no choice of 40 can do better than",
             "noise alone",
-            "1000 random candidates",
+            "rests on 1000 configurations",
+            "0.1000 % of the variance",
         ] {
             assert!(text.contains(expected), "{expected}: {text}");
         }

@@ -1,4 +1,6 @@
-//! Results as tables for people. Units are in the headers; machines get the same results as JSON.
+//! Results as tables and figures for people. Units are in the headers; machines get the same results as JSON.
+
+pub mod figure;
 
 mod advice;
 pub mod criterion;
@@ -235,7 +237,7 @@ pub fn number(value: f64) -> String {
 /// Table 4 of the paper beside ours.
 #[must_use]
 pub fn count_error(rows: &[crate::experiments::count_error::Row]) -> String {
-    use crate::experiments::count_error::Mean;
+    use crate::experiments::statistics::Mean;
     let value = |mean: &Option<Mean>, factor: f64| mean.map_or_else(|| "–".to_owned(), |mean| number(mean.mean * factor));
     let interval = |mean: &Option<Mean>, factor: f64| match mean.and_then(|mean| mean.interval95) {
         Some([low, high]) => format!("{} … {}", number(low * factor), number(high * factor)),
