@@ -32,7 +32,7 @@ use crate::seed::stream;
 use candidates::{AlwaysColliding, Rules, Sampler};
 use objective::{Models, Objective};
 use outcome::{DesignOutcome, EvennessDomains, RandomReference};
-use search::{SearchError, Task, Told, search, split};
+use search::{SearchError, Task, Told, finite, search, split};
 
 /// A design could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -95,7 +95,7 @@ pub fn design(scene: &Scene, listener: &mut dyn Listener) -> Result<DesignOutcom
     let outcome = DesignOutcome {
         method: problem.method.name().to_owned(),
         criterion: problem.criterion.name().to_owned(),
-        value: found.value,
+        value: finite(found.value),
         configurations: split(&found.configurations, arm.joint_count()),
         indexes,
         indexes_all_parameters,
