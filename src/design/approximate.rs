@@ -9,19 +9,20 @@
 //! section 2.9). The gap is `max sᵢ / Σ wᵢ sᵢ − 1`, and a design of invertible M is optimal if it is zero.
 //!
 //! **Gap for D.** Let M\* be optimal and λ the r eigenvalues of M⁻¹M\*. By the inequality of the means, (det M\*/det M)^(1/r) =
-//! (Π λ)^(1/r) ≤ Σ λ / r = Σ w\*ᵢ dᵢ / r ≤ max dᵢ / r = 1 + gap. Therefore log det M\* ≤ log det M + r log(1 + gap), which is tighter
-//! than log det M + max dᵢ − r of the tangent, because log(1 + x) ≤ x.
+//! (Π λ)^(1/r) ≤ Σ λ / r = Σ w\*ᵢ dᵢ / r ≤ max dᵢ / r = 1 + gap. Therefore log det M\* ≤ log det M + r log(1 + gap), which is
+//! tighter than log det M + max dᵢ − r of the tangent, because log(1 + x) ≤ x.
 //!
 //! **Gap for L.** Let L = KKᵀ and f = tr(L M⁻¹). By the inequality of Cauchy and Schwarz for ⟨A, B⟩ = tr(AᵀB) with A = M\*^(−½) K
 //! and B = M\*^(½) M⁻¹ K, f² = ⟨A, B⟩² ≤ tr(L M\*⁻¹) · tr(L M⁻¹ M\* M⁻¹) = f\* · Σ w\*ᵢ φᵢ ≤ f\* · max φᵢ. Therefore f\* ≥
 //! f² / max φᵢ = f / (1 + gap), which is tighter than the tangent's 2f − max φᵢ: the difference is (max φᵢ − f)² / max φᵢ.
 //!
 //! **How.** Newton's method on a few candidates at a time. Without its constraint Σ w = 1 the problem is to minimise
-//! −log det M + r Σ w (or tr(L M⁻¹) + f Σ w), whose minimum over w ≥ 0 is the same up to a scale. Its quadratic model is minimised
-//! over w ≥ 0 for the candidates that carry weight and those with the largest sensitivities (block principal pivoting: Portugal,
-//! Júdice and Vicente, Mathematics of Computation 63, 1994), then the model's minimum is approached as far as the criterion falls.
-//! The sensitivities of all candidates are one pass over their Gram matrices, taken once in coordinates that make the uniform
-//! design's information the identity. The reported numbers are computed afresh from the blocks, however the weights were found.
+//! −log det M + r Σ w (or tr(L M⁻¹) + f Σ w), whose minimum over w ≥ 0 is the same up to a scale. Its quadratic model is
+//! minimised over w ≥ 0 for the candidates that carry weight and those with the largest sensitivities (block principal pivoting:
+//! Portugal, Júdice and Vicente, Mathematics of Computation 63, 1994), then the model's minimum is approached as far as the
+//! criterion falls. The sensitivities of all candidates are one pass over their Gram matrices, taken once in coordinates that
+//! make the uniform design's information the identity. The reported numbers are computed afresh from the blocks, however the
+//! weights were found.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 use rayon::prelude::*;
@@ -37,8 +38,8 @@ use crate::quality::information::Blocks;
 pub enum Criterion<'a> {
     /// The largest log det M: the smallest ellipsoid of confidence of the parameters.
     D,
-    /// The smallest tr(L M⁻¹), for a symmetric positive semidefinite L (rank × rank). With L the mean of PᵀP over a workspace, P the
-    /// rows that turn parameters into a prediction, it is the mean variance of predictions (I-optimality).
+    /// The smallest tr(L M⁻¹), for a symmetric positive semidefinite L (rank × rank). With L the mean of PᵀP over a workspace, P
+    /// the rows that turn parameters into a prediction, it is the mean variance of predictions (I-optimality).
     L(&'a [f64]),
 }
 
@@ -73,8 +74,8 @@ pub struct ApproximateDesign {
     pub iterations: usize,
     /// Whether the gap is the settings' or less.
     pub converged: bool,
-    /// M of these weights (rank × rank, both triangles): the information per pose. The other numbers are as exact as its condition
-    /// allows.
+    /// M of these weights (rank × rank, both triangles): the information per pose. The other numbers are as exact as its
+    /// condition allows.
     pub information: Vec<f64>,
 }
 
@@ -128,8 +129,8 @@ impl ApproximateDesign {
         self.information.len().isqrt() as f64
     }
 
-    /// What no set of `poses` candidates can beat, repeated ones allowed, where its information is the sum over its poses: an upper
-    /// bound of its log det, or a lower bound of its tr(L M⁻¹). It is `poses` times the information of weights, after all.
+    /// What no set of `poses` candidates can beat, repeated ones allowed, where its information is the sum over its poses: an
+    /// upper bound of its log det, or a lower bound of its tr(L M⁻¹). It is `poses` times the information of weights, after all.
     #[must_use]
     pub fn bound_of_set(&self, criterion: Criterion<'_>, poses: usize) -> f64 {
         let poses = poses as f64;
@@ -150,9 +151,9 @@ impl ApproximateDesign {
         }
     }
 
-    /// Sensitivities of `candidates`, of the pool or further ones, over their weighted mean. Adding a candidate to the pool improves
-    /// the optimum only if it has more than one. If none of a continuum has more than `1 + g`, then `g` is the gap over that
-    /// continuum.
+    /// Sensitivities of `candidates`, of the pool or further ones, over their weighted mean. Adding a candidate to the pool
+    /// improves the optimum only if it has more than one. If none of a continuum has more than `1 + g`, then `g` is the gap over
+    /// that continuum.
     ///
     /// # Panics
     /// If a candidate has another rank than the design, or L is not rank × rank.
@@ -385,8 +386,8 @@ fn unpacked(packed: &[f64], n: usize) -> Vec<f64> {
     full
 }
 
-/// Rank of a positive semidefinite matrix (row-major `n × n`) by Cholesky's method with the largest pivot first, its columns scaled
-/// to one: pivots of the size of rounding count as zero.
+/// Rank of a positive semidefinite matrix (row-major `n × n`) by Cholesky's method with the largest pivot first, its columns
+/// scaled to one: pivots of the size of rounding count as zero.
 fn numerical_rank(matrix: &[f64], n: usize) -> usize {
     let scale: Vec<f64> = (0..n).map(|i| if matrix[i * n + i] > 0.0 { 1.0 / matrix[i * n + i].sqrt() } else { 0.0 }).collect();
     let mut rest: Vec<f64> = (0..n * n).map(|at| matrix[at] * scale[at / n] * scale[at % n]).collect();
@@ -626,8 +627,8 @@ fn working_set(support: &[usize], sensitivities: &[f64], mean: f64, entrants: us
     others
 }
 
-/// Weights `start + t · direction`, 0 < t ≤ 1, where the convex criterion still falls or nearly stopped falling; none where it does
-/// not fall at all.
+/// Weights `start + t · direction`, 0 < t ≤ 1, where the convex criterion still falls or nearly stopped falling; none where it
+/// does not fall at all.
 fn line_search(
     pool: &Pool,
     matrix: Option<&[f64]>,
@@ -973,8 +974,8 @@ mod tests {
 
     #[test]
     fn what_only_some_parameters_matter_for_has_a_design_as_well() {
-        // Variance of the slope at 0 (Chebyshev: 9 with the weight at the extremes of his polynomial), and of the prediction at 1,
-        // for which nothing but 1 need be measured: the information of the optimum is singular.
+        // Variance of the slope at 0 (Chebyshev: 9 with the weight at the extremes of his polynomial), and of the prediction at
+        // 1, for which nothing but 1 need be measured: the information of the optimum is singular.
         let blocks = polynomial(3, &grid(100));
         for (direction, best) in [([0.0, 1.0, 0.0, 0.0], 9.0), ([1.0, 1.0, 1.0, 1.0], 1.0)] {
             let matrix: Vec<f64> = (0..16).map(|at| direction[at / 4] * direction[at % 4]).collect();

@@ -1,5 +1,5 @@
-//! Small dense symmetric algebra on row-major slices: what the searches do millions of times. Plain loops in a fixed order, so that
-//! the bits do not depend on the processor's kernels.
+//! Small dense symmetric algebra on row-major slices: what the searches do millions of times. Plain loops in a fixed order, so
+//! that the bits do not depend on the processor's kernels.
 
 /// Adds `factor · rowsᵀ rows` to the lower triangle of the row-major `n × n` matrix `gram`; `rows` has `n` columns.
 pub fn add_gram(rows: &[f64], factor: f64, n: usize, gram: &mut [f64]) {
@@ -29,8 +29,8 @@ pub fn add_gram(rows: &[f64], factor: f64, n: usize, gram: &mut [f64]) {
     }
 }
 
-/// Replaces the lower triangle of the row-major `n × n` matrix by its Cholesky factor; false (and rubble) where it is not positive
-/// definite.
+/// Replaces the lower triangle of the row-major `n × n` matrix by its Cholesky factor; false (and rubble) where it is not
+/// positive definite.
 #[must_use]
 pub fn cholesky(matrix: &mut [f64], n: usize) -> bool {
     for i in 0..n {

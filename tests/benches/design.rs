@@ -26,8 +26,8 @@ fn approximate_l(bencher: Bencher, count: usize) {
     bencher.bench_local(|| optimise(black_box(&blocks), Criterion::L(&workspace), &Settings::default()));
 }
 
-/// Blocks of `count` free configurations of the paper's arm, and the mean of PᵀP over 200 others, P the rows of positions in their
-/// unscaled Jacobians.
+/// Blocks of `count` free configurations of the paper's arm, and the mean of PᵀP over 200 others, P the rows of positions in
+/// their unscaled Jacobians.
 fn candidates(count: usize) -> (Blocks, Vec<f64>) {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/paper.toml");
     let SceneFile { scene, .. } = kincal::scene::read(&path).expect("a shipped scene");
