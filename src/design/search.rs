@@ -157,11 +157,17 @@ impl<'a> Task<'a> {
             evaluations: self.evaluations(),
             budget: self.budget,
             rejections: self.rejections(),
-            value,
-            best,
+            value: finite(value),
+            best: finite(best),
             best_configurations: improved.map_or_else(Vec::new, |set| split(set, self.arm().joint_count())),
         })
     }
+}
+
+/// A value as it is told. A set that determines nothing has −∞, which JSON cannot hold: [`f64::MIN`] stands for it.
+#[must_use]
+pub fn finite(value: f64) -> f64 {
+    value.clamp(f64::MIN, f64::MAX)
 }
 
 /// Splits configurations that stand one after the other.
@@ -187,8 +193,13 @@ pub fn search(
         Method::Pso => super::swarm::search(task, swarm, stream, watch),
         Method::BestOfRandom => super::best_of_random::search(task, stream, watch),
         Method::CoordinateExchange => super::coordinate_exchange::search(task, stream, watch),
+        Method::Annealing => super::annealing::search(task, stream, watch),
         Method::Detmax => super::detmax::search(task, stream, watch),
-        _ => {
+        Method::ImprovedPso => super::improved_swarm::search(task, swarm, stream, watch),
+        Method::Genetic => super::genetic::search(task, stream, watch),
+        Method::GeneticRepeated => super::genetic_repeated::search(task, stream, watch),
+        Method::Perturbation => super::perturbation::search(task, stream, watch),
+        Method::Random => {
             let configurations = task.draw(stream, task.count)?;
             let value = task.value(&configurations, &mut Scratch::default());
             watch(task.step(0, value, value, Some(&configurations)))?;

@@ -3,6 +3,7 @@
 use std::sync::OnceLock;
 
 use super::findings::Tally;
+use super::limits::Limits;
 use super::statistics::Mean;
 use super::trial::Trial;
 use crate::design::DesignError;
@@ -10,9 +11,6 @@ use crate::design::candidates::Rules;
 use crate::design::objective::{Models, Objective};
 use crate::design::search::{Found, Task, Told, search};
 use crate::identification::outcome::{Errors, Residual, Summary};
-use crate::quality::dense;
-use crate::quality::information::{Blocks, InformationModel};
-use crate::quality::prediction::Prediction;
 use crate::scene::{Criterion, Injected, JacobianScaling, Method, Scene};
 use crate::seed::stream;
 use crate::session::SessionError;
@@ -44,6 +42,8 @@ pub struct Bench<'a> {
     pub injected: &'a Injected,
     /// Whoever is told.
     pub watcher: &'a dyn Watcher,
+    /// What no choice can go beyond, for the scene as it is.
+    pub limits: Limits,
     models: [OnceLock<Models>; 3],
     optimum: OnceLock<Found>,
 }
@@ -52,7 +52,7 @@ impl<'a> Bench<'a> {
     /// Nothing is computed yet.
     #[must_use]
     pub fn new(scene: &'a Scene, injected: &'a Injected, watcher: &'a dyn Watcher) -> Self {
-        Bench { scene, injected, watcher, models: Default::default(), optimum: OnceLock::new() }
+        Bench { scene, injected, watcher, limits: Limits::default(), models: Default::default(), optimum: OnceLock::new() }
     }
 
     /// Models of the scene.
@@ -132,19 +132,6 @@ pub(super) fn choose(
     };
     let found = search(choice.method, &task, &scene.design.swarm, &mut stream, &mut watch).map_err(DesignError::from)?;
     Ok((found, task.evaluations()))
-}
-
-/// What noise leaves after a calibration with `set`; `None` where it does not determine the parameters.
-pub(super) fn predict(models: &Models, set: &[f64], joint_count: usize) -> Option<Prediction> {
-    models.workspace.predict(&information(&models.information, set, joint_count))
-}
-
-/// Information of `set` (lower triangle, row-major).
-fn information(model: &InformationModel, set: &[f64], joint_count: usize) -> Vec<f64> {
-    let rank = model.rank();
-    let mut information = vec![0.0; rank * rank];
-    Blocks::of(model, set, joint_count).iter().for_each(|block| dense::add_gram(block, 1.0, rank, &mut information));
-    information
 }
 
 /// Fewest configurations that give as many equations as there are parameters to tell apart.

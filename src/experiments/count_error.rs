@@ -6,9 +6,8 @@
 use rayon::prelude::*;
 
 use super::Experiment;
-use super::bench::{Bench, DEG, Fit, MM, attitude, fewest, mean, mean_of, plain, predict, tally};
+use super::bench::{Bench, DEG, Fit, MM, attitude, fewest, mean, mean_of, plain, tally};
 use super::findings::{Claim, Data, Findings};
-use super::limits::Limits;
 use super::pictures::band;
 use super::published::Published;
 use super::statistics::Mean;
@@ -44,7 +43,6 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
     let (scene, arm, models) = (bench.scene, &bench.scene.arm, bench.models()?);
     let joint_count = arm.joint_count();
     let rules = Rules::measurable(arm, &scene.sensor);
-    let limits = Limits::new(models, &rules, scene.design.pool);
     let least = fewest(models);
     let table: Vec<usize> = published.row.iter().map(|row| row.configurations).collect();
     let (first, last) = (table[0].max(least), table[table.len() - 1]);
@@ -64,7 +62,7 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
             let points = counts.iter().map(|count| {
                 let set = &all[..count * joint_count];
                 let fit = Fit::new(&trial, set, models.information.rank())?;
-                Ok(Point { fit, predicted: predict(models, set, joint_count) })
+                Ok(Point { fit, predicted: models.predict(set, joint_count) })
             });
             let points = points.collect::<Result<_, SessionError>>()?;
             bench.watcher.step();
@@ -87,7 +85,7 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
                 attitude_rms: mean(fits(), |fit| attitude(&fit.after, |summary| summary.rms)),
                 predicted_position: predicted(|prediction| MM * prediction.position_rms_m),
                 predicted_attitude: predicted(|prediction| DEG * prediction.attitude_rms_rad),
-                bound: limits.least_rms_m(*count).map(|least| MM * least),
+                bound: bench.limits.least_rms_m(scene, models, *count).map(|least| MM * least),
                 not_converged: tally(fits()).not_converged,
             }
         })

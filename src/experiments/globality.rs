@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::Experiment;
 use super::arms::narrowed;
-use super::bench::{Bench, DEG, Fit, MM, attitude, mean, mean_of, plain, predict, tally};
+use super::bench::{Bench, DEG, Fit, MM, attitude, mean, mean_of, plain, tally};
 use super::findings::{Claim, Data, Findings};
 use super::pictures::{end_points, in_workspace, reach};
 use super::published::{Extremes, Published};
@@ -102,7 +102,7 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
                 indexes: [0, 1, 2].map(|set: usize| models.evaluator.evaluate(&sets[set], &mut scratch)),
                 other_evenness: [0, 1, 2].map(|set: usize| other_grid.evenness(&end_points(arm, &sets[set]))),
                 predicted_m: [0, 1, 2]
-                    .map(|set: usize| predict(models, &sets[set], joint_count).map_or(f64::NAN, |found| found.position_rms_m)),
+                    .map(|set: usize| models.predict(&sets[set], joint_count).map_or(f64::NAN, |found| found.position_rms_m)),
                 fits,
                 sets,
             };

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::Experiment;
 use super::arms::cut;
-use super::bench::{Bench, Choice, DEG, Fit, MM, choose, fewest, mean, mean_of, percent, plain, predict, tally};
+use super::bench::{Bench, Choice, DEG, Fit, MM, choose, fewest, mean, mean_of, percent, plain, tally};
 use super::findings::{Claim, Data, Findings};
 use super::limits::Limits;
 use super::published::Published;
@@ -44,7 +44,15 @@ const POSITIONS: usize = 20;
 /// The sets, in the order of [`Situation::fits`].
 const SETS: [&str; 3] = ["random", "optimal for O_C", "I-optimal"];
 
-/// Where the sets are compared.
+/// An arm, a sensor and their rules.
+struct Cell<'a> {
+    scene: &'a Scene,
+    models: &'a Models,
+    limits: &'a Limits,
+    label: String,
+}
+
+/// A cell with a number of configurations, and what came out.
 struct Situation {
     label: String,
     count: usize,
@@ -69,21 +77,15 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
     let (few, fewest_positions) = (FEW.max(fewest(models)), fewest(&position_models) + 1);
 
     bench.watcher.begin("calibrating", 4 * (trials + 2));
-    let own = compare(
-        bench,
-        scene,
-        models,
-        scene.design.count,
-        "full poses".to_owned(),
-        trials,
-        Some(&bench.optimum()?.configurations),
-    )?;
-    let cut_label = format!("positions only, joints ±{CUT_DEG}°");
+    let poses = Cell { scene, models, limits: &bench.limits, label: "full poses".to_owned() };
+    let limits = Limits::default();
+    let label = format!("positions only, joints ±{CUT_DEG}°");
+    let positions = Cell { scene: &positions, models: &position_models, limits: &limits, label };
     let situations = [
-        own,
-        compare(bench, scene, models, few, "full poses".to_owned(), trials, None)?,
-        compare(bench, &positions, &position_models, fewest_positions, cut_label.clone(), trials, None)?,
-        compare(bench, &positions, &position_models, POSITIONS.max(fewest_positions), cut_label, trials, None)?,
+        compare(bench, &poses, scene.design.count, trials, Some(&bench.optimum()?.configurations))?,
+        compare(bench, &poses, few, trials, None)?,
+        compare(bench, &positions, fewest_positions, trials, None)?,
+        compare(bench, &positions, POSITIONS.max(fewest_positions), trials, None)?,
     ];
 
     let mut claims = Vec::new();
@@ -163,13 +165,12 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
 /// Calibrates with random sets, the set optimal for O_C (`optimum`, or searched for) and the I-optimal set.
 fn compare(
     bench: &Bench<'_>,
-    scene: &Scene,
-    models: &Models,
+    cell: &Cell<'_>,
     count: usize,
-    label: String,
     trials: usize,
     optimum: Option<&[f64]>,
 ) -> Result<Situation, SessionError> {
+    let Cell { scene, models, limits, label } = cell;
     let joint_count = scene.arm.joint_count();
     let budget = scene.design.swarm.evaluations();
     let search = |method, criterion, budget| -> Result<Vec<f64>, SessionError> {
@@ -194,7 +195,8 @@ fn compare(
             let random = Sampler::new(&rules).draw(&mut stream(trial.seed(), &format!("headline/random/{count}")), count)?;
             let fits =
                 [Fit::new(&trial, &random, rank)?, Fit::new(&trial, &comprehensive, rank)?, Fit::new(&trial, &i_optimal, rank)?];
-            let predicted = predict(models, &random, joint_count)
+            let predicted = models
+                .predict(&random, joint_count)
                 .map_or([f64::NAN; 2], |found| [MM * found.position_rms_m, DEG * found.attitude_rms_rad]);
             bench.watcher.step();
             Ok((fits, predicted))
@@ -202,18 +204,19 @@ fn compare(
         .collect::<Result<_, _>>()?;
     let random = |kind: usize| mean_of(done.iter().map(|(_, predicted)| predicted[kind]));
     let single = |set: &[f64], kind: usize| {
-        predict(models, set, joint_count)
+        models
+            .predict(set, joint_count)
             .and_then(|found| mean_of([[MM * found.position_rms_m, DEG * found.attitude_rms_rad][kind]]))
     };
     let predicted = |kind: usize| [random(kind), single(&comprehensive, kind), single(&i_optimal, kind)];
     let (position, attitude) = (predicted(0), predicted(1));
     Ok(Situation {
-        label,
+        label: label.clone(),
         count,
         fits: done.into_iter().map(|(fits, _)| fits).collect(),
         predicted: position,
         predicted_attitude: attitude,
-        least: Limits::new(models, &rules, scene.design.pool).least_rms_m(count).map(|least| MM * least),
+        least: limits.least_rms_m(scene, models, count).map(|least| MM * least),
     })
 }
 

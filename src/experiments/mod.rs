@@ -3,6 +3,7 @@
 //! One file per experiment of Chen et al. 2019; each returns [`findings::Findings`]: the paper's numbers beside ours.
 
 pub mod arms;
+pub mod bake_off;
 pub mod bench;
 pub mod count_error;
 pub mod count_index;
@@ -15,6 +16,7 @@ mod pictures;
 pub mod published;
 pub mod quality;
 pub mod sets;
+pub mod situation;
 pub mod statistics;
 pub mod trial;
 

@@ -9,10 +9,8 @@ use std::time::Instant;
 use super::Experiment;
 use super::bench::{Bench, Choice, MM, SCALINGS, choose, mean_of, plain};
 use super::findings::{Claim, Data, Findings, Tally};
-use super::limits::Limits;
 use super::pictures::{end_points, in_workspace, reach};
 use super::published::Published;
-use crate::design::candidates::Rules;
 use crate::design::search::Told;
 use crate::report::figure::{Axis, Figure, Kind, Panel, Series};
 use crate::scene::{Criterion, Method};
@@ -68,8 +66,6 @@ fn run(bench: &Bench<'_>, runs: usize) -> Result<Findings, SessionError> {
     }
 
     let models = bench.models()?;
-    let rules = Rules::measurable(arm, &scene.sensor);
-    let limits = Limits::new(models, &rules, scene.design.pool);
     let mut searched = Vec::new();
     for (criterion, budget) in searches {
         for method in Method::ALL {
@@ -103,7 +99,12 @@ fn run(bench: &Bench<'_>, runs: usize) -> Result<Findings, SessionError> {
             searched.push(Searched { method, criterion, budget, evaluations, value: found.value, history });
         }
     }
-    let bound = |criterion: Criterion| bound(&limits, criterion, count);
+    // What no set of so many goes beyond, in terms for people.
+    let bound = |criterion: Criterion| match criterion {
+        Criterion::IOptimality => bench.limits.least_rms_m(scene, models, count).map(|least| MM * least),
+        Criterion::DOptimality => bench.limits.largest_d(scene, models, count),
+        _ => None,
+    };
     for search in &searched {
         let what = format!("{}, {}, {} values", name(criterion_kind(search.criterion)), search.method.name(), search.budget);
         let ours = readable(search.criterion, search.value);
@@ -167,15 +168,6 @@ fn readable(criterion: Criterion, value: f64) -> f64 {
     match criterion {
         Criterion::IOptimality => MM * libm::exp(-0.5 * value),
         _ => value,
-    }
-}
-
-/// What no set of `count` goes beyond, in the same terms.
-fn bound(limits: &Limits, criterion: Criterion, count: usize) -> Option<f64> {
-    match criterion {
-        Criterion::IOptimality => limits.least_rms_m(count).map(|least| MM * least),
-        Criterion::DOptimality => limits.largest_d(count),
-        _ => None,
     }
 }
 

@@ -87,12 +87,17 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
     let (across, within) = (by_range(true)?, by_range(false)?);
 
     let rho = |sets: &[Sets], index: usize, error: fn(&Fit) -> f64| {
-        mean_of(sets.iter().filter_map(|sets| {
-            let kept: Vec<&Sample> = sets.iter().filter(|sample| sample.fit.converged).collect();
-            let values: Vec<f64> = kept.iter().map(|sample| sample.indexes[index]).collect();
-            let errors: Vec<f64> = kept.iter().map(|sample| error(&sample.fit)).collect();
-            rank_correlation(&values, &errors)
-        }))
+        Mean::of_correlations(
+            &sets
+                .iter()
+                .filter_map(|sets| {
+                    let kept: Vec<&Sample> = sets.iter().filter(|sample| sample.fit.converged).collect();
+                    let values: Vec<f64> = kept.iter().map(|sample| sample.indexes[index]).collect();
+                    let errors: Vec<f64> = kept.iter().map(|sample| error(&sample.fit)).collect();
+                    rank_correlation(&values, &errors)
+                })
+                .collect::<Vec<_>>(),
+        )
     };
     let mut claims = Vec::new();
     for (end, range) in [(0, 0), (1, ranges.len() - 1)] {
@@ -241,7 +246,7 @@ fn correlation_figure(
     Figure::new(format!("{arm}: −ρ of index and held-out error (1: the index ranks perfectly)"), 1).with(
         Panel::new(Axis::categories("", columns.map(|column| column.0)), Axis::categories("", INDEXES))
             .unlabelled()
-            .with(Series::new("", Kind::Cells { values, digits: 2, shade: Shade::Columns })),
+            .with(Series::new("", Kind::Cells { values, digits: 2, shade: Shade::Table })),
     )
 }
 

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::Experiment;
-use super::bench::{Bench, mean_of, predict};
+use super::bench::{Bench, mean_of};
 use super::findings::{Claim, Data, Findings, Tally};
 use crate::design::candidates::{Rules, Sampler};
 use crate::quality::Indexes;
@@ -40,7 +40,7 @@ fn run(bench: &Bench<'_>, sets: usize) -> Result<Findings, SessionError> {
         .map_init(Scratch::default, |scratch, number| -> Result<_, SessionError> {
             let seed = derive(scene.seed, number as u64);
             let set = Sampler::new(&rules).draw(&mut stream(seed, "sets"), count)?;
-            let predicted = predict(models, &set, arm.joint_count()).map_or(f64::NAN, |found| 1e3 * found.position_rms_m);
+            let predicted = models.predict(&set, arm.joint_count()).map_or(f64::NAN, |found| 1e3 * found.position_rms_m);
             let indexes = models.evaluator.evaluate(&set, scratch);
             bench.watcher.step();
             Ok((indexes, predicted))
@@ -48,7 +48,7 @@ fn run(bench: &Bench<'_>, sets: usize) -> Result<Findings, SessionError> {
         .collect::<Result<_, _>>()?;
     let chosen = bench.optimum()?;
     let optimum = models.evaluator.evaluate(&chosen.configurations, &mut Scratch::default());
-    let predicted = predict(models, &chosen.configurations, arm.joint_count()).map(|found| 1e3 * found.position_rms_m);
+    let predicted = models.predict(&chosen.configurations, arm.joint_count()).map(|found| 1e3 * found.position_rms_m);
 
     let mut claims = Vec::new();
     let mut above = Vec::new();

@@ -431,8 +431,10 @@ mod tests {
 
     #[test]
     fn the_pendulum_of_a_urdf_hangs_so_too() {
-        // As below, but the axis is y of the joint's frame, as only a URDF can say it: the mass is given in a frame that is not turned.
-        let urdf = r#"<robot name="pendulum"><link name="base"/><link name="bob"><inertial><origin xyz="0.1 0.3 0"/><mass value="2"/>
+        // As below, but the axis is y of the joint's frame, as only a URDF can say it: the mass is given in a frame that is not
+        // turned.
+        let urdf = r#"<robot name="pendulum"><link name="base"/><link name="bob"><inertial>
+            <origin xyz="0.1 0.3 0"/><mass value="2"/>
             <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link><link name="tip"/>
             <joint name="swing" type="revolute"><parent link="base"/><child link="bob"/><axis xyz="0 1 0"/>
             <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>

@@ -177,6 +177,12 @@ impl Criterion {
         Criterion::GOptimality,
     ];
 
+    /// The criterion with this name.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Criterion> {
+        Criterion::ALL.into_iter().find(|criterion| criterion.name() == name)
+    }
+
     /// The criterion's name in scenes and results.
     #[must_use]
     pub fn name(self) -> &'static str {

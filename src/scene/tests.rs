@@ -13,6 +13,10 @@ const ARM8: &str = include_str!("../../scenes/arm8.toml");
 const PAPER: &str = include_str!("../../scenes/paper.toml");
 const PANDA: &str = include_str!("../../scenes/panda.toml");
 const PANDA_URDF: &str = include_str!("../../scenes/panda.urdf");
+/// Every method and every criterion, as an error names them.
+const METHODS: &str =
+    "pso, improved_pso, detmax, annealing, genetic, genetic_repeated, perturbation, coordinate_exchange, best_of_random, random";
+const CRITERIA: &str = "comprehensive, o1, o2, o3, o4, o5, o6, dispersion, evenness, d_optimality, i_optimality, g_optimality";
 
 fn shipped() -> [(SceneFile, &'static str); 2] {
     [("arm8.toml", ARM8), ("paper.toml", PAPER)].map(|(name, text)| match parse(text, name) {
@@ -71,7 +75,7 @@ fn what_is_wrong_is_named_with_line_key_and_remedy() {
         ("seed = 2019", 0, "seed = -1", &["seed", "a whole number, not negative"]),
         ("count = 40", 0, "count = 40.5", &["design.count", "a whole number, not negative"]),
         ("gravity_m_s2 = [0, 0, -9.81]", 0, "gravity_m_s2 = [0, -9.81]", &["arm.gravity_m_s2", "a list of three numbers"]),
-        ("method = \"pso\"", 0, "method = \"psa\"", &["design.method", "`psa`", "pso, random", "did you mean `pso`?"]),
+        ("method = \"pso\"", 0, "method = \"psa\"", &["design.method", "`psa`", METHODS, "did you mean `pso`?"]),
         (
             "profile = \"heat-and-cool\"",
             0,
@@ -209,6 +213,21 @@ fn the_public_part_parses_back_to_the_same_scene_and_hides_the_rest() {
 }
 
 #[test]
+fn methods_and_criteria_go_by_the_names_that_errors_list() {
+    assert_eq!(Method::ALL.map(Method::name).join(", "), METHODS);
+    assert_eq!(Criterion::ALL.map(Criterion::name).join(", "), CRITERIA);
+    let [(mut file, _), _] = shipped();
+    for method in Method::ALL {
+        file.set("design.method", &format!("{:?}", method.name())).expect("allowed");
+        assert_eq!(file.scene.design.method, method);
+    }
+    for criterion in Criterion::ALL {
+        file.set("design.criterion", &format!("{:?}", criterion.name())).expect("allowed");
+        assert_eq!(file.scene.design.criterion, criterion);
+    }
+}
+
+#[test]
 fn overrides_are_validated_and_written() {
     let [(mut file, _), _] = shipped();
     file.set_seed(7).expect("allowed");
@@ -236,7 +255,8 @@ fn overrides_are_validated_and_written() {
         (file.set("design.cuont", "9"), "override design.cuont = 9", "did you mean `count`?"),
         (file.set("desing.count", "9"), "override desing.count = 9", "no `desing` in this scene"),
         (file.set("design.method", "pso"), "override design.method = pso", "TOML"),
-        (file.set("design.method", "\"ga\""), "design.method", "pso, random"),
+        (file.set("design.method", "\"ga\""), "design.method", METHODS),
+        (file.set("design.criterion", "\"oc\""), "design.criterion", CRITERIA),
         (file.set("arm.frame[12].a_mm", "9"), "override arm.frame[12].a_mm = 9", "no `frame[12]`"),
     ];
     for (result, origin, fragment) in refused {
@@ -527,6 +547,8 @@ fn what_is_wrong_with_an_arm_from_a_urdf_is_named() {
         (inline.replacen("[sensor]", frame, 1), &["arm.frame", "with convention = \"urdf\"", "remove the key"]),
         (inline.replacen("convention = \"urdf\"", six, 1), &["arm.base", "with convention = \"urdf\"", "the URDF's"]),
         (inline.replacen("[sensor]", "[arm.base_link]\n[sensor]", 1), &["arm.base_link", "where it begins is urdf_base_link"]),
+        (inline.replacen("urdf = '", "base_link = 'foot'\nurdf = '", 1), &["arm.base_link", "did you mean `urdf_base_link`?"]),
+        (inline.replacen("urdf = '", "tip_link = 'nest'\nurdf = '", 1), &["arm.tip_link", "did you mean `urdf_tip_link`?"]),
         (inline.replacen("urdf = '", "urdf_tip = 'nest'\nurdf = '", 1), &["arm.urdf_tip", "did you mean `urdf_tip_link`?"]),
         (PANDA.replacen("urdf_file = \"panda.urdf\"", "urdf = 5", 1), &["arm.urdf", "a string"]),
         (ARM8.replacen("note = ", "urdf_file = \"x\"\nnote = ", 1), &["arm.urdf_file", "with convention = \"mdh5\""]),

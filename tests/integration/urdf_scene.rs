@@ -32,7 +32,7 @@ fn a_scene_with_a_urdf_runs_and_replays_without_the_file() {
     // Play and warming, too: the masses are the URDF's.
     let effects = [
         "--set",
-        "injected.clearance=[{joint=\"panda_joint2\",radial_um=30,axial_um=10,tilt_urad=100},{joint=\"panda_joint4\",tilt_urad=100}]",
+        "injected.clearance=[{joint=\"panda_joint2\",radial_um=30,tilt_urad=100},{joint=\"panda_joint4\",tilt_urad=100}]",
         "--set",
         "injected.thermal={expansion_um_per_m_per_k=23,rise_k=10,profile=\"warm-up\"}",
         "--json",
