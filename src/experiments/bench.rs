@@ -130,7 +130,10 @@ pub(super) fn choose(
         watch(told);
         Ok(())
     };
-    let found = search(choice.method, &task, &scene.design.swarm, &mut stream, &mut watch).map_err(DesignError::from)?;
+    // A swarm makes as many iterations as it may.
+    let mut swarm = scene.design.swarm.clone();
+    swarm.iterations = (usize::try_from(choice.budget).unwrap_or(usize::MAX) / swarm.particles.max(1)).saturating_sub(1);
+    let found = search(choice.method, &task, &swarm, &mut stream, &mut watch).map_err(DesignError::from)?;
     Ok((found, task.evaluations()))
 }
 

@@ -30,8 +30,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// Configurations to either side over which the gradient of O_C is taken.
-const GRADIENT: usize = 5;
+/// The gradient of O_C at m is taken from m over this factor to m times it.
+const GRADIENT: f64 = 1.25;
 /// Names of the indexes, in the order in which they are kept.
 const INDEXES: [&str; 4] = ["O1", "O2", "O3", "O_C"];
 
@@ -180,9 +180,12 @@ fn growth_figure(arm: &str, counts: &[usize], mean: &MeanAt<'_>, published: &sup
         let start = value(scaling, counts[0]);
         let points = counts.iter().map(|count| [*count as f64, 100.0 * (value(scaling, *count) / start - 1.0)]).collect();
         growth = growth.with(Series::new(*label, Kind::Line(points)));
-        let steps = counts.iter().skip(GRADIENT).take(counts.len().saturating_sub(2 * GRADIENT)).map(|count| {
-            let rise = value(scaling, count + GRADIENT) - value(scaling, count - GRADIENT);
-            [*count as f64, rise / (2 * GRADIENT) as f64]
+        let [first, .., last] = counts else { continue };
+        let steps = counts.iter().filter_map(|count| {
+            let low = libm::round(*count as f64 / GRADIENT) as usize;
+            let high = libm::round(*count as f64 * GRADIENT) as usize;
+            let rise = (low >= *first && high <= *last && low < high).then(|| value(scaling, high) - value(scaling, low))?;
+            Some([*count as f64, rise / (high - low) as f64])
         });
         gradient = gradient.with(Series::new(*label, Kind::Line(steps.collect())));
     }

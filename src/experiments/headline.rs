@@ -34,7 +34,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 };
 
 /// Values of the criterion for the search on I-optimality, in budgets of the swarm.
-const LEISURE: u64 = 25;
+const BUDGETS: u64 = 25;
 /// Few configurations with full poses: eq. 30's number for the paper's arm.
 const FEW: usize = 8;
 /// Cut joint ranges, °.
@@ -183,7 +183,7 @@ fn compare(
         None => search(Method::Pso, Criterion::Comprehensive, budget)?,
     };
     bench.watcher.step();
-    let i_optimal = search(Method::CoordinateExchange, Criterion::IOptimality, LEISURE * budget)?;
+    let i_optimal = search(Method::CoordinateExchange, Criterion::IOptimality, BUDGETS * budget)?;
     bench.watcher.step();
 
     let rules = Rules::measurable(&scene.arm, &scene.sensor);

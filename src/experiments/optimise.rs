@@ -21,7 +21,7 @@ pub const EXPERIMENT: Experiment =
     Experiment { name: "optimise", place: "Table 5, Fig. 12", about: "the paper's swarm and other methods", trials: 5, run };
 
 /// Budget of methods at leisure, in budgets of the swarm.
-const LEISURE: u64 = 25;
+const LEISURE: u64 = 10;
 
 /// Colours of the palette of figures.
 const COLOURS: usize = 7;
@@ -99,12 +99,14 @@ fn run(bench: &Bench<'_>, runs: usize) -> Result<Findings, SessionError> {
             searched.push(Searched { method, criterion, budget, evaluations, value: found.value, history });
         }
     }
-    // What no set of so many goes beyond, in terms for people.
-    let bound = |criterion: Criterion| match criterion {
-        Criterion::IOptimality => bench.limits.least_rms_m(scene, models, count).map(|least| MM * least),
+    // What no set of so many goes beyond, as the criterion's value.
+    let limit = |criterion: Criterion| match criterion {
+        Criterion::IOptimality => bench.limits.least_rms_m(scene, models, count).map(|least| -2.0 * libm::log(least)),
         Criterion::DOptimality => bench.limits.largest_d(scene, models, count),
         _ => None,
     };
+    let readable = |criterion: Criterion, value: f64| readable(criterion, value, limit(criterion));
+    let bound = |criterion: Criterion| limit(criterion).map(|limit| readable(criterion, limit));
     for search in &searched {
         let what = format!("{}, {}, {} values", name(criterion_kind(search.criterion)), search.method.name(), search.budget);
         let ours = readable(search.criterion, search.value);
@@ -147,14 +149,14 @@ fn run(bench: &Bench<'_>, runs: usize) -> Result<Findings, SessionError> {
         verdict,
         notes: vec![
             format!("m = {count}; {runs} runs of the swarm for each scaling, one search for each method, criterion and budget."),
-            "I-optimality is given as the position RMS over the workspace that noise lets expect, D-optimality as the logarithm of the \
-             information's determinant over its dimension."
+            "I-optimality is given as the position RMS over the workspace that noise lets expect, D-optimality as the r-th root of the \
+             information's determinant over the largest that any set has (r parameters)."
                 .to_owned(),
         ],
         fits: Tally::default(),
-        data: vec![data(&searched, &bound), history(&searched)],
+        data: vec![data(&searched, &limit), history(&searched)],
         figures: vec![
-            ("optimise-convergence".to_owned(), figure(&arm.name, &searched, budget, &bound)),
+            ("optimise-convergence".to_owned(), figure(&arm.name, &searched, budget, &limit)),
             (
                 "optimise-points".to_owned(),
                 in_workspace(format!("{}: end points of the set optimal for O_C", arm.name), &reach(arm)?, "optimal set", &points),
@@ -163,10 +165,12 @@ fn run(bench: &Bench<'_>, runs: usize) -> Result<Findings, SessionError> {
     })
 }
 
-/// What a value of the criterion means for people: O_C, the predicted RMS in mm, or the logarithm of the determinant's root.
-fn readable(criterion: Criterion, value: f64) -> f64 {
-    match criterion {
-        Criterion::IOptimality => MM * libm::exp(-0.5 * value),
+/// What a value of the criterion means for people: O_C, the predicted RMS in mm, or the efficiency in % (the determinant's root over
+/// the largest, `limit`; the value itself where that is not known).
+fn readable(criterion: Criterion, value: f64, limit: Option<f64>) -> f64 {
+    match (criterion, limit) {
+        (Criterion::IOptimality, _) => MM * libm::exp(-0.5 * value),
+        (Criterion::DOptimality, Some(limit)) => 100.0 * libm::exp(value - limit),
         _ => value,
     }
 }
@@ -180,22 +184,13 @@ fn criterion_kind(criterion: Criterion) -> usize {
 }
 
 fn name(kind: usize) -> &'static str {
-    ["O_C", "I-optimality, RMS (mm)", "D-optimality"][kind]
+    ["O_C", "I-optimality, RMS (mm)", "D-optimality, efficiency (%)"][kind]
 }
 
-type BoundOf<'b> = dyn Fn(Criterion) -> Option<f64> + 'b;
-
-/// Share of the optimum: for D the ratio of the determinants' roots, for I that of the root mean squares.
-fn share(search: &Searched, bound: Option<f64>) -> f64 {
-    match (search.criterion, bound) {
-        (Criterion::IOptimality, Some(bound)) => bound / readable(search.criterion, search.value),
-        (Criterion::DOptimality, Some(bound)) => libm::exp(search.value - bound),
-        _ => f64::NAN,
-    }
-}
+type Limit<'l> = dyn Fn(Criterion) -> Option<f64> + 'l;
 
 /// Best value against what it cost.
-fn figure(arm: &str, searched: &[Searched], budget: u64, bound: &BoundOf<'_>) -> Figure {
+fn figure(arm: &str, searched: &[Searched], budget: u64, limit: &Limit<'_>) -> Figure {
     let mut figure = Figure::new(format!("{arm}: best value against values computed"), 2);
     let panels = [
         (Criterion::Comprehensive, budget, "(a) O_C"),
@@ -204,12 +199,21 @@ fn figure(arm: &str, searched: &[Searched], budget: u64, bound: &BoundOf<'_>) ->
         (Criterion::IOptimality, LEISURE * budget, "(d) I-optimality at leisure"),
     ];
     for (criterion, budget, title) in panels {
-        let label = ["O_C", "predicted position RMS (mm)", "log determinant over dimension"][criterion_kind(criterion)];
-        let mut panel = Panel::new(Axis::log("values of the criterion"), Axis::linear(label)).titled(title);
-        let shown = searched.iter().filter(|search| search.criterion == criterion && search.budget == budget);
-        for (number, search) in shown.enumerate() {
+        let label = ["O_C", "predicted position RMS (mm)", "D-efficiency (%)"][criterion_kind(criterion)];
+        let shown = || searched.iter().filter(|search| search.criterion == criterion && search.budget == budget);
+        let limit = limit(criterion);
+        let mut axis = Axis::linear(label);
+        let random = shown().find(|search| search.method == Method::Random);
+        if let (Some(limit), Some(random)) = (limit, random) {
+            // The poor beginnings of some methods would hide all the rest.
+            let (best, usual) = (readable(criterion, limit, Some(limit)), readable(criterion, random.value, Some(limit)));
+            let ends = [best - 0.1 * (usual - best), usual + 0.5 * (usual - best)];
+            axis = axis.range(ends[0].min(ends[1]), ends[0].max(ends[1]));
+        }
+        let mut panel = Panel::new(Axis::log("values of the criterion"), axis).titled(title);
+        for (number, search) in shown().enumerate() {
             let points: Vec<[f64; 2]> =
-                search.history.iter().map(|(spent, best)| [(*spent).max(1) as f64, readable(criterion, *best)]).collect();
+                search.history.iter().map(|(spent, best)| [(*spent).max(1) as f64, readable(criterion, *best, limit)]).collect();
             let kind = match points.len() {
                 1 => Kind::Points(points),
                 // The palette repeats.
@@ -218,25 +222,27 @@ fn figure(arm: &str, searched: &[Searched], budget: u64, bound: &BoundOf<'_>) ->
             };
             panel = panel.with(Series::new(search.method.name(), kind));
         }
-        if let Some(bound) = bound(criterion) {
-            panel = panel.with(Series::new("no set goes beyond", Kind::Horizontal(bound)));
+        if let Some(limit) = limit {
+            panel = panel.with(Series::new("no set goes beyond", Kind::Horizontal(readable(criterion, limit, Some(limit)))));
         }
         figure = figure.with(panel);
     }
     figure
 }
 
-fn data(searched: &[Searched], bound: &BoundOf<'_>) -> Data {
-    let columns = ["criterion", "method", "budget", "evaluations", "value", "readable", "bound", "efficiency"];
+fn data(searched: &[Searched], limit: &Limit<'_>) -> Data {
+    let columns = ["criterion", "method", "budget", "evaluations", "value", "readable", "limit", "efficiency"];
     let rows = searched.iter().map(|search| {
-        let bound = bound(search.criterion);
+        let limit = limit(search.criterion);
+        // Ratio of the determinants' roots, or of the root mean squares.
+        let power = if search.criterion == Criterion::IOptimality { 0.5 } else { 1.0 };
         let numbers = vec![
             search.budget as f64,
             search.evaluations as f64,
             search.value,
-            readable(search.criterion, search.value),
-            bound.unwrap_or(f64::NAN),
-            share(search, bound),
+            readable(search.criterion, search.value, limit),
+            limit.unwrap_or(f64::NAN),
+            limit.map_or(f64::NAN, |limit| libm::exp(power * (search.value - limit))),
         ];
         (vec![search.criterion.name().to_owned(), search.method.name().to_owned()], numbers)
     });
