@@ -50,13 +50,16 @@ pub fn search(task: &Task<'_>, stream: &mut Stream, watch: &mut Watch<'_>) -> Re
     Ok(best)
 }
 
+/// Hears members and value of a set, and whether it is the last.
+pub(super) type Tell<'t> = dyn FnMut(&[usize], f64, bool) -> Result<(), SearchError> + 't;
+
 /// One search: from `members` to a set that no excursion makes better. `tell` gets members and value of every better set, and the
 /// last.
 pub(super) fn climb(
     task: &Task<'_>,
     pool: &[f64],
     members: Vec<usize>,
-    tell: &mut dyn FnMut(&[usize], f64, bool) -> Result<(), SearchError>,
+    tell: &mut Tell<'_>,
 ) -> Result<(Vec<usize>, f64), SearchError> {
     let count = members.len();
     let mut set = PoolSet::new(task, pool, members.clone());
