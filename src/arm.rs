@@ -95,6 +95,17 @@ pub enum Geometry {
 }
 
 impl Inertial {
+    /// The same mass distribution of frame b in frame a.
+    #[must_use]
+    pub fn moved(&self, a_from_b: &Pose) -> Inertial {
+        let rotation = a_from_b.rotation.to_rotation_matrix().into_inner();
+        Inertial {
+            mass_kg: self.mass_kg,
+            centre_of_mass_in_link: a_from_b * self.centre_of_mass_in_link,
+            inertia_in_link: rotation * self.inertia_in_link * rotation.transpose(),
+        }
+    }
+
     /// Why no body has this inertia, as what was found and what is allowed; `None` if one may have it.
     #[must_use]
     pub fn impossible(&self) -> Option<(String, &'static str)> {

@@ -26,6 +26,9 @@ pub enum SessionError {
     /// Measuring.
     #[error(transparent)]
     Measure(#[from] MeasureError),
+    /// Nothing that could verify a calibration was measured.
+    #[error("nothing is held out: set plan.held_out_count = 1 or more")]
+    NothingHeldOut,
     /// Identifying.
     #[error(transparent)]
     Identification(#[from] IdentificationError),
@@ -115,7 +118,10 @@ pub fn real_robot(start: &Start, real: &RealCell) -> Result<(Arm, Vec<String>), 
             let imported = urdf::import(text, "robot", real.base_link.as_deref(), real.tip_link.as_deref())?;
             Ok((imported.arm, imported.notes))
         }
-        None => Ok((scene::parse(&start.scene, "robot")?.scene.arm, Vec::new())),
+        None => {
+            let scene = scene::parse(&start.scene, "robot")?.scene;
+            Ok((scene.arm, scene.urdf_notes))
+        }
     }
 }
 
@@ -131,6 +137,7 @@ pub fn real_arm(real: &RealCell, robot: (Arm, Vec<String>), measurements: &[Meas
         position_sigma_per_m: 0.0,
         attitude_sigma_rad: attitude.then_some(real.attitude_sigma_rad),
         temperature_sigma_k: None,
+        view: None,
     };
     let fit: Vec<&Measurement> = measurements.iter().filter(|measurement| measurement.role == Role::Fit).collect();
     let (nominal, notes) = robot;
@@ -177,7 +184,8 @@ pub fn identify_and_tell(
     measurements: &[Measurement],
     listener: &mut dyn Listener,
 ) -> Result<Identification, SessionError> {
-    let identification = identify(&scene.arm, &scene.sensor, scene.weights, measurements)?;
+    let mut identification = identify(&scene.arm, &scene.sensor, scene.weights, measurements)?;
+    identification.notes.extend(scene.urdf_notes.iter().cloned());
     tell(&identification, listener)?;
     Ok(identification)
 }

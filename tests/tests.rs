@@ -27,3 +27,5 @@ mod repository;
 mod secrecy;
 #[path = "integration/steps.rs"]
 mod steps;
+#[path = "integration/urdf_scene.rs"]
+mod urdf_scene;

@@ -10,7 +10,7 @@ use crate::{design, report, session};
 pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result<Outcome> {
     let file = output::scene(global, options)?;
     let stem = output::stem(global, &file, "-design");
-    let mut audience = Audience::open(global, &file.scene.arm, Some(&stem), &stem)?;
+    let mut audience = Audience::open(global, &file.scene.arm, Some(&file.scene.design), Some(&stem), &stem)?;
     session::start("design", &file.public_toml()?, &mut audience)?;
     let outcome = design::design(&file.scene, &mut audience)?;
     let recording = audience.finish()?;

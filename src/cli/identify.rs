@@ -35,7 +35,7 @@ fn from_recording(global: &Global, options: &IdentifyOptions) -> anyhow::Result<
     let measurements = with_evaluation(measurements, options, &scene.arm)?;
 
     let stem = input_stem(&options.input, "-identified");
-    let mut audience = Audience::open(global, &scene.arm, Some(&stem), &stem)?;
+    let mut audience = Audience::open(global, &scene.arm, None, Some(&stem), &stem)?;
     session::start("identify", &file.public_toml()?, &mut audience)?;
     for measurement in &measurements {
         audience.take(&Event::Measured(measurement.clone()))?;
@@ -83,7 +83,7 @@ fn real_cell(
     let real = session::real_arm(real, nominal, &measurements).with_context(|| options.input.display().to_string())?;
 
     let stem = input_stem(&options.input, "-identified");
-    let mut audience = Audience::open(global, &real.arm, Some(&stem), &stem)?;
+    let mut audience = Audience::open(global, &real.arm, None, Some(&stem), &stem)?;
     audience.take(&Event::Start(start))?;
     for measurement in &measurements {
         audience.take(&Event::Measured(measurement.clone()))?;

@@ -13,7 +13,8 @@ use crate::identification::outcome::Identification;
 use crate::recording::event::{Event, Listener, ListenerError};
 use crate::recording::truth_file::write_whole;
 use crate::recording::write::Recorder;
-use crate::scene::{Injected, SceneFile};
+use crate::report::criterion::Words;
+use crate::scene::{Criterion, DesignProblem, Injected, SceneFile};
 
 /// Reads a scene and applies the overrides of the command line.
 pub(crate) fn scene(global: &Global, options: &SceneOptions) -> anyhow::Result<SceneFile> {
@@ -30,6 +31,10 @@ pub(crate) fn scene(global: &Global, options: &SceneOptions) -> anyhow::Result<S
     }
     if let Some(seed) = global.seed {
         file.set_seed(seed)?;
+    }
+    // Before anything else: a mesh that was skipped or a mass that is not known may be why what follows is refused.
+    for text in &file.scene.urdf_notes {
+        note(global, &format!("note: {text}"));
     }
     Ok(file)
 }
@@ -156,10 +161,17 @@ pub(crate) struct Audience {
 
 impl Audience {
     /// Opens the viewer, then the recording (if `stem` is given): what can fail without leaving anything comes first.
-    pub(crate) fn open(global: &Global, arm: &Arm, stem: Option<&str>, name: &str) -> anyhow::Result<Audience> {
+    /// `design` is the problem whose solving they will hear, if any.
+    pub(crate) fn open(
+        global: &Global,
+        arm: &Arm,
+        design: Option<&DesignProblem>,
+        stem: Option<&str>,
+        name: &str,
+    ) -> anyhow::Result<Audience> {
         #[cfg(feature = "viewer")]
         let viewer = {
-            let viewer = crate::viewing::open(&global.rerun.parse()?, arm, name)?;
+            let viewer = crate::viewing::open(&global.rerun.parse()?, arm, design, name)?;
             if let Some(viewer) = &viewer {
                 note(global, &viewer.describe());
             }
@@ -173,7 +185,7 @@ impl Audience {
             recorder,
             #[cfg(feature = "viewer")]
             viewer,
-            progress: Progress::new(visible),
+            progress: Progress::new(visible, design.map(|design| design.criterion)),
         })
     }
 
@@ -220,19 +232,20 @@ impl Listener for Audience {
 
 /// A progress bar of `length` steps for people at a terminal; hidden for everyone else.
 pub(crate) fn progress(global: &Global, what: &'static str, length: u64) -> ProgressBar {
-    let progress = Progress::new(!global.quiet && std::io::stderr().is_terminal());
+    let progress = Progress::new(!global.quiet && std::io::stderr().is_terminal(), None);
     progress.start(what, length);
     progress.bar
 }
 
 struct Progress {
     bar: ProgressBar,
+    criterion: Words,
 }
 
 impl Progress {
-    fn new(visible: bool) -> Self {
+    fn new(visible: bool, criterion: Option<Criterion>) -> Self {
         let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        Progress { bar: ProgressBar::with_draw_target(None, target) }
+        Progress { bar: ProgressBar::with_draw_target(None, target), criterion: Words::new(criterion) }
     }
 
     fn see(&self, event: &Event) {
@@ -242,7 +255,8 @@ impl Progress {
                     self.start("choosing", iteration.iterations as u64);
                 }
                 self.bar.set_position(iteration.iteration as u64);
-                self.bar.set_message(format!("O_C {:.4}", iteration.best.comprehensive));
+                let best = iteration.best_value();
+                self.bar.set_message(best.map(|best| self.criterion.value(best)).unwrap_or_default());
             }
             Event::Designed(outcome) => {
                 self.start("measuring", outcome.configurations.len() as u64);
@@ -253,7 +267,7 @@ impl Progress {
                     self.start("choosing", step.budget);
                 }
                 self.bar.set_position(step.evaluations);
-                self.bar.set_message(format!("best {:.4}", step.best));
+                self.bar.set_message(self.criterion.value(step.best));
             }
             Event::Start(_) | Event::Identified(_) | Event::Note(_) => {}
         }

@@ -56,9 +56,10 @@ pub(crate) fn command(global: &Global, options: &ReplayOptions) -> anyhow::Resul
     });
     let truth = truth.transpose()?;
 
+    let problem = file.as_ref().map(|file| &file.scene.design);
     let mut replayer = Replayer {
         comparer: Comparer::open(path, arm)?,
-        audience: Audience::open(global, arm, None, &format!("replay of {name}"))?,
+        audience: Audience::open(global, arm, problem, None, &format!("replay of {name}"))?,
     };
     let recomputed = session::replay(subject, &recorded.events, truth.as_ref().map(|(injected, _)| injected), &mut replayer);
     let cut = recorded.cut.is_some();

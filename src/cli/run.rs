@@ -22,7 +22,7 @@ pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result
     cell::measure::check(scene, injected).with_context(|| options.scene.display().to_string())?;
     [&truth_path, &urdf_path, &calibrated_path].into_iter().try_for_each(|path| output::check_target(path))?;
 
-    let mut audience = Audience::open(global, &scene.arm, Some(&stem), &stem)?;
+    let mut audience = Audience::open(global, &scene.arm, Some(&scene.design), Some(&stem), &stem)?;
     let run = session::run(scene, &file.public_toml()?, injected, &mut audience)?;
     // Before the recording gets its final name, so that none is ever there without its truth.
     truth_file(&file, &run.truth)?.write(&truth_path)?;

@@ -46,8 +46,9 @@ impl<'a> Rules<'a> {
     }
 
     fn hidden(&self, joints: &[f64]) -> bool {
-        let _ = (joints, &self.chain, self.sensor);
-        false
+        // Forward kinematics only where there is something that the sensor may not see.
+        let limited = self.sensor.filter(|sensor| sensor.view.is_some());
+        limited.is_some_and(|sensor| !sensor.sees(&self.chain.forward(joints).translation.vector))
     }
 }
 

@@ -50,7 +50,7 @@ pub fn search(task: &Task<'_>, stream: &mut Stream, watch: &mut Watch<'_>) -> Re
     Ok(best)
 }
 
-/// Hears members and value of a set, and whether it is the last.
+/// Told members, value, and whether it is the last set.
 pub(super) type Tell<'t> = dyn FnMut(&[usize], f64, bool) -> Result<(), SearchError> + 't;
 
 /// One search: from `members` to a set that no excursion makes better. `tell` gets members and value of every better set, and the

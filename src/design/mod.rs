@@ -1,7 +1,10 @@
 //! Choosing the configurations to measure.
 
+pub mod advice;
 pub mod annealing;
+pub mod approximate;
 pub mod best_of_random;
+pub mod bound;
 pub mod candidates;
 pub mod coordinate_exchange;
 pub mod detmax;
@@ -29,7 +32,7 @@ use crate::seed::stream;
 use candidates::{AlwaysColliding, Rules, Sampler};
 use objective::{Models, Objective};
 use outcome::{DesignOutcome, EvennessDomains, RandomReference};
-use search::{SearchError, Task, Told, search, split};
+use search::{SearchError, Task, Told, finite, search, split};
 
 /// A design could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -61,7 +64,8 @@ pub fn design(scene: &Scene, listener: &mut dyn Listener) -> Result<DesignOutcom
     let rules = Rules::measurable(arm, &scene.sensor);
     let models = Models::new(scene)?;
     let evaluator = &models.evaluator;
-    let random = random_sets(scene, evaluator, &rules)?;
+    let random_sets = random_sets(scene, &rules)?;
+    let random = reference(&random_sets, evaluator);
 
     let objective = Objective::new(&models, problem.criterion, arm.joint_count());
     let budget = match problem.method {
@@ -91,7 +95,7 @@ pub fn design(scene: &Scene, listener: &mut dyn Listener) -> Result<DesignOutcom
     let outcome = DesignOutcome {
         method: problem.method.name().to_owned(),
         criterion: problem.criterion.name().to_owned(),
-        value: found.value,
+        value: finite(found.value),
         configurations: split(&found.configurations, arm.joint_count()),
         indexes,
         indexes_all_parameters,
@@ -100,7 +104,7 @@ pub fn design(scene: &Scene, listener: &mut dyn Listener) -> Result<DesignOutcom
             bounding_cube: evenness_in(EvennessDomain::BoundingCube),
         },
         random,
-        advice: None,
+        advice: advice::advise(scene, &models, &rules, &found.configurations, &random_sets),
         dropped_parameters: evaluator.subspace().dropped.iter().map(|&c| arm.chain.parameters[c].name.clone()).collect(),
         evaluations: task.evaluations(),
         rejections: task.rejections(),
@@ -122,11 +126,14 @@ pub fn held_out(scene: &Scene) -> Result<Vec<Vec<f64>>, AlwaysColliding> {
     Ok(split(&drawn, scene.arm.joint_count()))
 }
 
-fn random_sets(scene: &Scene, evaluator: &Evaluator, rules: &Rules<'_>) -> Result<RandomReference, AlwaysColliding> {
+fn random_sets(scene: &Scene, rules: &Rules<'_>) -> Result<Vec<Vec<f64>>, AlwaysColliding> {
     let mut sampler = Sampler::new(rules);
-    let sets = (0..scene.design.random_sets)
+    (0..scene.design.random_sets)
         .map(|set| sampler.draw(&mut stream(scene.seed, &format!("design/random/{set}")), scene.design.count))
-        .collect::<Result<Vec<_>, _>>()?;
+        .collect()
+}
+
+fn reference(sets: &[Vec<f64>], evaluator: &Evaluator) -> RandomReference {
     let indexes: Vec<Indexes> =
         sets.par_iter().map_init(Scratch::default, |scratch, set| evaluator.evaluate(set, scratch)).collect();
     let over = |combine: fn(f64, f64) -> f64, start: f64| {
@@ -135,9 +142,9 @@ fn random_sets(scene: &Scene, evaluator: &Evaluator, rules: &Rules<'_>) -> Resul
     let count = indexes.len().max(1) as f64;
     let mean = fold(&indexes, |values| values.sum::<f64>() / count, |ranks| (ranks.sum::<usize>() as f64 / count) as usize);
     if indexes.is_empty() {
-        return Ok(RandomReference { sets: 0, mean: Indexes::default(), min: Indexes::default(), max: Indexes::default() });
+        return RandomReference { sets: 0, mean: Indexes::default(), min: Indexes::default(), max: Indexes::default() };
     }
-    Ok(RandomReference { sets: indexes.len(), mean, min: over(f64::min, f64::INFINITY), max: over(f64::max, f64::NEG_INFINITY) })
+    RandomReference { sets: indexes.len(), mean, min: over(f64::min, f64::INFINITY), max: over(f64::max, f64::NEG_INFINITY) }
 }
 
 /// Combines every field of `indexes`.

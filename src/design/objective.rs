@@ -6,9 +6,9 @@ use super::candidates::{AlwaysColliding, Rules, Sampler};
 use crate::quality::dense;
 use crate::quality::evaluator::{Evaluator, comprehensive};
 use crate::quality::globality::dispersion;
-use crate::quality::information::{InformationModel, JacobianScratch};
+use crate::quality::information::{Blocks, InformationModel, JacobianScratch};
 use crate::quality::observability::observability;
-use crate::quality::prediction::PredictionWorkspace;
+use crate::quality::prediction::{Prediction, PredictionWorkspace};
 use crate::scene::{Criterion, Scene};
 use crate::seed::stream;
 
@@ -57,6 +57,17 @@ impl Models {
             }
         }
         Ok(Models { evaluator, information, workspace, ridge })
+    }
+
+    /// What `configurations` (one after the other, rad or m) let expect of a model calibrated with them; `None` where they do not
+    /// determine the parameters.
+    #[must_use]
+    pub fn predict(&self, configurations: &[f64], joint_count: usize) -> Option<Prediction> {
+        let rank = self.information.rank();
+        let blocks = Blocks::of(&self.information, configurations, joint_count);
+        let mut information = vec![0.0; rank * rank];
+        blocks.iter().for_each(|block| dense::add_gram(block, 1.0, rank, &mut information));
+        self.workspace.predict(&information)
     }
 
     /// Adds the ridge to an information matrix (row-major).

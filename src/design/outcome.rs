@@ -12,7 +12,7 @@ pub struct SwarmIteration {
     pub iteration: usize,
     /// Iterations that will be made if nothing stops the swarm before.
     pub iterations: usize,
-    /// Fitness (O_C) of each particle where it is now.
+    /// Fitness of each particle where it is now: the criterion's value as in [`SearchStep::value`], O_C in the paper.
     pub fitness: Vec<f64>,
     /// Fitness of each particle's best-known position.
     pub personal_best: Vec<f64>,
@@ -37,6 +37,14 @@ pub struct SwarmIteration {
     pub best_configurations: Vec<Vec<f64>>,
 }
 
+impl SwarmIteration {
+    /// The criterion's value at the swarm's best-known position.
+    #[must_use]
+    pub fn best_value(&self) -> Option<f64> {
+        self.personal_best.get(self.best_particle).copied()
+    }
+}
+
 /// A step of a search by any other method.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SearchStep {
@@ -49,7 +57,7 @@ pub struct SearchStep {
     /// Configurations refused so far, because they collide or the sensor does not see them.
     pub rejections: u64,
     /// Value of the criterion where the search is (a population's mean). Larger is better: an index as it is, the determinant of
-    /// the information as the logarithm of its r-th root, a variance (m²) as minus its logarithm.
+    /// the information as the logarithm of its r-th root, a variance (m²) as minus its logarithm; always finite.
     pub value: f64,
     /// The best value so far.
     pub best: f64,
@@ -123,8 +131,10 @@ pub struct DesignOutcome {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Advice {
     /// The chosen set; absent where it does not determine the parameters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chosen: Option<Prediction>,
     /// Mean over the random sets that determine the parameters; absent where none does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub random: Option<Prediction>,
     /// Smallest and largest position error of these, m.
     pub random_range_m: [f64; 2],

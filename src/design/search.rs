@@ -157,11 +157,17 @@ impl<'a> Task<'a> {
             evaluations: self.evaluations(),
             budget: self.budget,
             rejections: self.rejections(),
-            value,
-            best,
+            value: finite(value),
+            best: finite(best),
             best_configurations: improved.map_or_else(Vec::new, |set| split(set, self.arm().joint_count())),
         })
     }
+}
+
+/// A value as it is told. A set that determines nothing has −∞, which JSON cannot hold: [`f64::MIN`] stands for it.
+#[must_use]
+pub fn finite(value: f64) -> f64 {
+    value.clamp(f64::MIN, f64::MAX)
 }
 
 /// Splits configurations that stand one after the other.

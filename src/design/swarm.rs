@@ -12,7 +12,7 @@
 use rayon::prelude::*;
 
 use super::outcome::{StopReason, SwarmIteration};
-use super::search::{Found, Scratch, SearchError, Task, Told, Watch, split};
+use super::search::{Found, Scratch, SearchError, Task, Told, Watch, finite, split};
 use crate::quality::Indexes;
 use crate::quality::evaluator;
 use crate::scene::Swarm;
@@ -132,7 +132,7 @@ fn leader_of(particles: &[Particle]) -> usize {
 
 impl Particle {
     fn evaluate(&mut self, task: &Task<'_>) {
-        self.value = task.value(&self.position, &mut self.scratch);
+        self.value = finite(task.value(&self.position, &mut self.scratch));
         self.end_points.clear();
         let ends = self.scratch.objective.end_points();
         self.end_points.extend(ends.iter().map(|point| [point.x as f32, point.y as f32, point.z as f32]));

@@ -2,16 +2,13 @@
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::cell::measure;
-use crate::cell::measure::plan;
+use super::statistics::Mean;
+use super::trial::Trial;
 use crate::design::candidates::{Rules, Sampler};
-use crate::design::search::split;
-use crate::identification::identify;
-use crate::recording::event::Nobody;
+use crate::identification::outcome::Errors;
 use crate::scene::{Injected, Scene};
-use crate::seed::{derive, stream};
+use crate::seed::stream;
 use crate::session::SessionError;
 
 const PUBLISHED: &str = include_str!("../../tests/reference/chen2019-table4.toml");
@@ -38,15 +35,6 @@ pub struct Row {
     pub attitude_rad: Option<Mean>,
     /// Mean position error of the nominal model, m.
     pub nominal_position_m: Option<Mean>,
-}
-
-/// A mean over trials.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Mean {
-    /// Mean.
-    pub mean: f64,
-    /// 95 % confidence interval of the mean (Student); absent for a single trial.
-    pub interval95: Option<[f64; 2]>,
 }
 
 #[derive(Deserialize)]
@@ -79,7 +67,7 @@ pub fn run(scene: &Scene, injected: &Injected, trials: usize, done: &(dyn Fn() +
                 .map(|trial| one(scene, injected, published.count, trial).inspect(|_| done()))
                 .collect::<Result<_, _>>()?;
             let converged: Vec<[f64; 3]> = results.iter().copied().flatten().collect();
-            let mean = |component: usize| Mean::of(converged.iter().map(|result| result[component]));
+            let mean = |component: usize| Mean::of(&converged.iter().map(|result| result[component]).collect::<Vec<_>>());
             Ok(Row {
                 count: published.count,
                 paper_position_m: published.position_mm * 1e-3,
@@ -95,38 +83,13 @@ pub fn run(scene: &Scene, injected: &Injected, trials: usize, done: &(dyn Fn() +
 }
 
 /// Mean held-out position error, attitude error, and position error of the nominal model of one calibration.
-fn one(scene: &Scene, injected: &Injected, count: usize, trial: usize) -> Result<Option<[f64; 3]>, SessionError> {
-    let mut scene = scene.clone();
-    scene.seed = derive(scene.seed, trial as u64);
+fn one(scene: &Scene, injected: &Injected, count: usize, number: usize) -> Result<Option<[f64; 3]>, SessionError> {
+    let trial = Trial::new(scene, injected, number)?;
     let rules = Rules::measurable(&scene.arm, &scene.sensor);
-    let chosen = Sampler::new(&rules).draw(&mut stream(scene.seed, &format!("count_error/{count}")), count)?;
-    let held_out = crate::design::held_out(&scene)?;
-    let planned = plan(&scene, &split(&chosen, scene.arm.joint_count()), &held_out);
-    let (measurements, _) = measure(&scene, injected, &planned, planned.len(), &mut Nobody)?;
-    let result = identify(&scene.arm, &scene.sensor, scene.weights, &measurements)?;
-    Ok(match (result.converged, result.held_out, result.held_out_nominal) {
-        (true, Some(after), Some(before)) => {
-            Some([after.position_m.mean, after.rotation_rad.map_or(0.0, |rotation| rotation.mean), before.position_m.mean])
-        }
-        _ => None,
-    })
-}
-
-impl Mean {
-    /// `None` where there are no values.
-    fn of(values: impl Iterator<Item = f64> + Clone) -> Option<Mean> {
-        let count = values.clone().count();
-        if count == 0 {
-            return None;
-        }
-        let mean = values.clone().sum::<f64>() / count as f64;
-        let interval95 = StudentsT::new(0.0, 1.0, count as f64 - 1.0).ok().map(|distribution| {
-            let variance = values.map(|value| (value - mean).powi(2)).sum::<f64>() / (count as f64 - 1.0);
-            let half = distribution.inverse_cdf(0.975) * (variance / count as f64).sqrt();
-            [mean - half, mean + half]
-        });
-        Some(Mean { mean, interval95 })
-    }
+    let chosen = Sampler::new(&rules).draw(&mut stream(trial.seed(), &format!("count_error/{count}")), count)?;
+    let result = trial.calibrate(&chosen)?;
+    let rotation = |errors: &Errors| errors.rotation_rad.map_or(0.0, |rotation| rotation.mean);
+    Ok(result.converged.then(|| [result.after.position_m.mean, rotation(&result.after), result.before.position_m.mean]))
 }
 
 #[cfg(test)]

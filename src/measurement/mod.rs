@@ -67,6 +67,17 @@ pub struct Sensor {
     pub attitude_sigma_rad: Option<f64>,
     /// Noise of the temperature sensors on the moving links, K; `None` where there are none.
     pub temperature_sigma_k: Option<f64>,
+    /// The cone that it sees; `None` where it sees everything.
+    pub view: Option<View>,
+}
+
+/// What a sensor sees: a cone whose apex is the sensor's position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// A point on the axis, in base, m.
+    pub towards_in_base: Point3<f64>,
+    /// Between axis and edge, rad; π sees everything.
+    pub half_angle_rad: f64,
 }
 
 impl Sensor {
@@ -74,5 +85,17 @@ impl Sensor {
     #[must_use]
     pub fn position_sigma_at(&self, position: &Vector3<f64>) -> f64 {
         self.position_sigma_m + self.position_sigma_per_m * (position - self.position_in_base.coords).norm()
+    }
+
+    /// Whether the sensor sees `point` (in base, m): within its cone, apex included, or anywhere where it has none.
+    #[must_use]
+    pub fn sees(&self, point: &Vector3<f64>) -> bool {
+        let Some(view) = &self.view else {
+            return true;
+        };
+        let axis = view.towards_in_base - self.position_in_base;
+        let sight = point - self.position_in_base.coords;
+        // Exact at 0 and π, where an arc cosine would hang on rounding.
+        libm::atan2(axis.cross(&sight).norm(), axis.dot(&sight)) <= view.half_angle_rad
     }
 }

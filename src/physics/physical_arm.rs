@@ -69,7 +69,7 @@ impl PhysicalArm {
             converged = moved_m < self.settling.tolerance_m && moved_rad < self.settling.tolerance_rad;
         }
         let base_from_link = std::iter::once(self.arm.base_from_base_link)
-            .chain((0..count).map(|joint| self.world.base_from_link(joint)))
+            .chain((0..count).map(|joint| self.world.base_from_link(joint) * self.arm.joint_from_link[joint]))
             .collect();
         let seats = plays.iter().zip(&decisions).enumerate().map(|(joint, (play, by))| seat(joint, play, by)).collect();
         Settled {
@@ -426,6 +426,33 @@ mod tests {
             assert!(Vector2::from(seat.radial_in_joint).norm() < 1e-15, "{:?}", seat.radial_in_joint);
             assert!((seat.axial_in_joint + clearance.axial_m).abs() < 1e-12);
             assert!(settled.seats[1..].iter().all(|seat| seat.radial_by == SeatedBy::Fit && seat.radial_in_joint == [0.0; 2]));
+        }
+    }
+
+    #[test]
+    fn the_pendulum_of_a_urdf_hangs_so_too() {
+        // As below, but the axis is y of the joint's frame, as only a URDF can say it: the mass is given in a frame that is not
+        // turned.
+        let urdf = r#"<robot name="pendulum"><link name="base"/><link name="bob"><inertial>
+            <origin xyz="0.1 0.3 0"/><mass value="2"/>
+            <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link><link name="tip"/>
+            <joint name="swing" type="revolute"><parent link="base"/><child link="bob"/><axis xyz="0 1 0"/>
+            <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+            <joint name="end" type="fixed"><parent link="bob"/><child link="tip"/><origin xyz="0 0.3 0"/></joint></robot>"#;
+        let arm = crate::kinematics::urdf::import(urdf, "pendulum", None, None).unwrap().arm;
+        let (c, gamma) = (40e-6, 150e-6);
+        let clearance = Clearance { radial_m: c, axial_m: 25e-6, tilt_rad: gamma };
+        for q in [0.0, 1.0, -2.0] {
+            let settling = Settling { start: Start::Centre, ..Settling::default() };
+            let settled = PhysicalArm::new(&arm, &arm.chain.nominal(), &[clearance], settling).unwrap().settle(&[q], &[1.0; 2]);
+            let seat = settled.seats[0];
+            assert_eq!((seat.radial_by, seat.axial_by, seat.tilt_by), (SeatedBy::Load, SeatedBy::Friction, SeatedBy::Load));
+            let tool = settled.base_from_tool.translation.vector;
+            let by_hand = nalgebra::Vector3::new(0.0, 0.3 * gamma.cos(), -c - 0.3 * gamma.sin());
+            assert!((tool - by_hand).norm() < 3e-8, "{tool} instead of {by_hand}");
+            // Links are told in their own frames: about y turned by the reading, but for the play.
+            let turned = Pose::rotation(nalgebra::Vector3::y() * q);
+            assert!(pose_error(&settled.base_from_link[1], &turned).amax() < 2.0 * gamma);
         }
     }
 

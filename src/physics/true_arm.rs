@@ -7,7 +7,7 @@ use super::error::PhysicsError;
 use super::play::{Decision, Load};
 use crate::arm::{Arm, Inertial};
 use crate::frames::Pose;
-use crate::kinematics::JointKind;
+use crate::kinematics::{JointKind, Step};
 
 /// Segments, masses and clearances of the arm with its true parameters.
 #[derive(Clone, Debug)]
@@ -20,6 +20,8 @@ pub(super) struct TrueArm {
     pub(super) clearances: Vec<Clearance>,
     /// Mass distribution of the link that each joint moves, in the frame after the joint's motion.
     pub(super) inertials: Vec<Inertial>,
+    /// Pose of that link's frame in the frame after the joint's motion: turned where a URDF's axis is not z.
+    pub(super) joint_from_link: Vec<Pose>,
     /// m/s².
     pub(super) gravity_in_base: Vector3<f64>,
     /// Pose of the base link's frame in the chain's first frame.
@@ -60,7 +62,10 @@ impl TrueArm {
         for (joint, clearance) in clearances.iter().enumerate() {
             clearance.check(joint)?;
         }
-        let inertials = arm.links[1..].iter().map(checked_inertial).collect::<Result<Vec<_>, _>>()?;
+        let joint_from_link: Vec<Pose> = (0..count).map(|joint| joint_from_link(arm, joint)).collect();
+        let inertials = (arm.links[1..].iter().zip(&joint_from_link))
+            .map(|(link, joint_from_link)| checked_inertial(link).map(|inertial| moved(inertial, joint_from_link)))
+            .collect::<Result<Vec<_>, _>>()?;
         let at = arm.chain.at(parameters_true);
         let base = arm.chain.frame_names().iter().position(|name| *name == arm.links[0].name);
         let base_from_base_link = base.map_or_else(Pose::identity, |index| at.frames(&vec![0.0; count])[index]);
@@ -81,6 +86,7 @@ impl TrueArm {
             kinds: arm.chain.joints.iter().map(|joint| joint.kind).collect(),
             clearances: clearances.to_vec(),
             inertials,
+            joint_from_link,
             gravity_in_base: arm.gravity_in_base,
             base_from_base_link,
             holding,
@@ -130,6 +136,22 @@ impl TrueArm {
             })
             .collect()
     }
+}
+
+/// Where the frame of the link that `joint` moves lies in the frame after the joint's motion.
+fn joint_from_link(arm: &Arm, joint: usize) -> Pose {
+    let after =
+        arm.chain.steps.iter().skip_while(|step| !matches!(step, Step::Joint { joint: other } if *other == joint)).skip(1);
+    let fixed = after.map_while(|step| match step {
+        Step::Fixed(pose) => Some(pose),
+        _ => None,
+    });
+    fixed.fold(Pose::identity(), |joint_from_here, pose| joint_from_here * pose)
+}
+
+/// The mass in the joint's frame; to the bit as it is where that is the link's.
+fn moved(inertial: Inertial, joint_from_link: &Pose) -> Inertial {
+    if *joint_from_link == Pose::identity() { inertial } else { inertial.moved(joint_from_link) }
 }
 
 /// The rotation by `angle` (rad) about z.

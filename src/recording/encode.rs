@@ -6,15 +6,14 @@ use foxglove::messages::{
     Color, CubePrimitive, CylinderPrimitive, FrameTransform, FrameTransforms, JointState, JointStates, Log, PoseInFrame,
     PosesInFrame, Quaternion, SceneEntity, SceneUpdate, SpherePrimitive, Timestamp, Vector3, log,
 };
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 
+use super::cloud;
 use super::event::{Event, Start};
+use super::json::Source;
 use super::skeleton::Skeleton;
 use super::topic::Topic;
-use super::{cloud, json};
 use crate::arm::{Arm, Fixture, Geometry, Shape};
-use crate::design::outcome::{DesignOutcome, SwarmIteration};
+use crate::design::outcome::{DesignOutcome, SearchStep, SwarmIteration};
 use crate::frames::Pose;
 use crate::identification::outcome::Identification;
 use crate::kinematics::chain::{Chain, ChainAt, Step};
@@ -104,7 +103,7 @@ impl Encoder {
         match event {
             Event::Start(start) => self.start(start, &mut messages)?,
             Event::Swarm(swarm) => self.swarm(swarm, &mut messages)?,
-            Event::Search(_) => {}
+            Event::Search(step) => self.search(step, &mut messages)?,
             Event::Designed(outcome) => self.designed(outcome, &mut messages)?,
             Event::Measured(measurement) => self.measured(measurement, &mut messages)?,
             Event::Identified(identification) => self.identified(identification, &mut messages)?,
@@ -158,20 +157,30 @@ impl Encoder {
     }
 
     fn swarm(&self, swarm: &SwarmIteration, messages: &mut Messages) -> Result<(), EncodeError> {
-        messages.json(Topic::Swarm, &json::Swarm::from(swarm))?;
+        messages.json(Topic::Swarm, swarm)?;
         if !swarm.end_points.is_empty() {
             messages.protobuf(Topic::SwarmEndPoints, &cloud::end_points(swarm, timestamp(self.now_ns), &self.root));
         }
-        if !swarm.best_configurations.is_empty() {
-            self.check_joints(Topic::Swarm, &swarm.best_configurations)?;
-            let points = swarm.best_configurations.iter().map(|joints| self.nominal.forward(joints).translation.vector.into());
+        self.best(Topic::Swarm, &swarm.best_configurations, messages)
+    }
+
+    fn search(&self, step: &SearchStep, messages: &mut Messages) -> Result<(), EncodeError> {
+        messages.json(Topic::Search, step)?;
+        self.best(Topic::Search, &step.best_configurations, messages)
+    }
+
+    /// The end points of the best set, where `topic` tells a new one.
+    fn best(&self, topic: Topic, configurations: &[Vec<f64>], messages: &mut Messages) -> Result<(), EncodeError> {
+        if !configurations.is_empty() {
+            self.check_joints(topic, configurations)?;
+            let points = configurations.iter().map(|joints| self.nominal.forward(joints).translation.vector.into());
             messages.protobuf(Topic::BestEndPoints, &cloud::best(points, timestamp(self.now_ns), &self.root));
         }
         Ok(())
     }
 
     fn designed(&self, outcome: &DesignOutcome, messages: &mut Messages) -> Result<(), EncodeError> {
-        messages.json(Topic::Design, &json::Design::from(outcome))?;
+        messages.json(Topic::Design, outcome)?;
         self.check_joints(Topic::Design, &outcome.configurations)?;
         let poses = outcome.configurations.iter().map(|joints| pose(&self.nominal.forward(joints))).collect();
         messages.protobuf(Topic::Chosen, &self.poses_in_frame(poses));
@@ -359,13 +368,13 @@ impl Messages {
         self.push(topic, message.encode_to_vec());
     }
 
-    fn json<T: Serialize + DeserializeOwned + PartialEq>(&mut self, topic: Topic, value: &T) -> Result<(), EncodeError> {
+    fn json<T: Source>(&mut self, topic: Topic, value: &T) -> Result<(), EncodeError> {
         let not_finite =
             |field: &str, reason: String| EncodeError::NotFinite { topic: topic.name(), field: field.to_owned(), reason };
-        let data = serde_json::to_vec(value).map_err(|error| not_finite("a number", error.to_string()))?;
+        let data = value.to_json().map_err(|error| not_finite("a number", error.to_string()))?;
         // serde_json writes what is not finite as null without a word: reading back is the only check that sees all fields.
-        match serde_json::from_slice::<T>(&data) {
-            Ok(restored) if restored == *value => {
+        match T::from_json(&data) {
+            Ok(restored) if value.is_same(&restored) => {
                 self.push(topic, data);
                 Ok(())
             }

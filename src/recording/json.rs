@@ -1,27 +1,107 @@
-//! JSON forms of the source messages, where they are not those of the events themselves.
+//! JSON forms of the source messages: those of the events themselves but where a viewer needs another.
 
 use serde::{Deserialize, Serialize};
 
-use crate::design::outcome::{Advice, DesignOutcome, EvennessDomains, RandomReference, StopReason, SwarmIteration};
+use super::event::Start;
+use crate::design::outcome::{Advice, DesignOutcome, EvennessDomains, RandomReference, SearchStep, StopReason, SwarmIteration};
+use crate::identification::outcome::Identification;
+use crate::measurement::Measurement;
 use crate::quality::Indexes;
 
-/// A configuration as an object: Foxglove shows no arrays of arrays.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Configuration {
-    joints: Vec<f64>,
+/// What a source message on a JSON topic holds.
+pub(super) trait Source: PartialEq + Sized {
+    /// Writes it as JSON.
+    ///
+    /// # Errors
+    /// If JSON cannot hold it.
+    fn to_json(&self) -> serde_json::Result<Vec<u8>>;
+
+    /// Reads it back, without what is recorded elsewhere.
+    ///
+    /// # Errors
+    /// If `data` is something else.
+    fn from_json(data: &[u8]) -> serde_json::Result<Self>;
+
+    /// Whether `restored` is what was written.
+    fn is_same(&self, restored: &Self) -> bool {
+        self == restored
+    }
 }
 
-fn wrap(configurations: &[Vec<f64>]) -> Vec<Configuration> {
-    configurations.iter().map(|joints| Configuration { joints: joints.clone() }).collect()
+/// Events whose JSON is that of the `--json` option.
+macro_rules! as_it_is {
+    ($($event:ty),*) => {$(
+        impl Source for $event {
+            fn to_json(&self) -> serde_json::Result<Vec<u8>> {
+                serde_json::to_vec(self)
+            }
+
+            fn from_json(data: &[u8]) -> serde_json::Result<Self> {
+                serde_json::from_slice(data)
+            }
+        }
+    )*};
 }
 
-fn unwrap(configurations: Vec<Configuration>) -> Vec<Vec<f64>> {
-    configurations.into_iter().map(|configuration| configuration.joints).collect()
+/// Events whose JSON is that of a form below.
+macro_rules! as_form {
+    ($($event:ident, $form:ident { $($more:item)* })*) => {$(
+        impl Source for $event {
+            fn to_json(&self) -> serde_json::Result<Vec<u8>> {
+                let mut data = Vec::new();
+                $form::serialize(self, &mut serde_json::Serializer::new(&mut data))?;
+                Ok(data)
+            }
+
+            fn from_json(data: &[u8]) -> serde_json::Result<Self> {
+                let mut reader = serde_json::Deserializer::from_slice(data);
+                let event = $form::deserialize(&mut reader)?;
+                reader.end()?;
+                Ok(event)
+            }
+
+            $($more)*
+        }
+    )*};
+}
+
+as_it_is!(Start, Measurement, Identification);
+as_form! {
+    SwarmIteration, SwarmForm {
+        fn is_same(&self, restored: &Self) -> bool {
+            // The end points are in a cloud of their own.
+            *self == SwarmIteration { end_points: self.end_points.clone(), ..restored.clone() }
+        }
+    }
+    SearchStep, SearchForm {}
+    DesignOutcome, DesignForm {}
+}
+
+/// Configurations as objects: Foxglove shows no arrays of arrays.
+mod configurations {
+    use std::borrow::Cow;
+
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    #[derive(Serialize, Deserialize)]
+    struct Configuration<'a> {
+        joints: Cow<'a, [f64]>,
+    }
+
+    pub(super) fn serialize<S: Serializer>(configurations: &[Vec<f64>], serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(configurations.iter().map(|joints| Configuration { joints: Cow::Borrowed(joints) }))
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Vec<f64>>, D::Error> {
+        let configurations = Vec::<Configuration<'static>>::deserialize(deserializer)?;
+        Ok(configurations.into_iter().map(|configuration| configuration.joints.into_owned()).collect())
+    }
 }
 
 /// [`SwarmIteration`] without its end points.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Swarm {
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "SwarmIteration")]
+struct SwarmForm {
     iteration: usize,
     iterations: usize,
     fitness: Vec<f64>,
@@ -33,56 +113,37 @@ pub(super) struct Swarm {
     c2: f64,
     evaluations: u64,
     rejections: u64,
-    best_configurations: Vec<Configuration>,
+    #[serde(skip)]
+    end_points: Vec<Vec<[f32; 3]>>,
+    #[serde(with = "configurations")]
+    best_configurations: Vec<Vec<f64>>,
 }
 
-impl From<&SwarmIteration> for Swarm {
-    fn from(swarm: &SwarmIteration) -> Self {
-        Swarm {
-            iteration: swarm.iteration,
-            iterations: swarm.iterations,
-            fitness: swarm.fitness.clone(),
-            personal_best: swarm.personal_best.clone(),
-            best_particle: swarm.best_particle,
-            best: swarm.best,
-            inertia: swarm.inertia,
-            c1: swarm.c1,
-            c2: swarm.c2,
-            evaluations: swarm.evaluations,
-            rejections: swarm.rejections,
-            best_configurations: wrap(&swarm.best_configurations),
-        }
-    }
-}
-
-impl From<Swarm> for SwarmIteration {
-    fn from(swarm: Swarm) -> Self {
-        SwarmIteration {
-            iteration: swarm.iteration,
-            iterations: swarm.iterations,
-            fitness: swarm.fitness,
-            personal_best: swarm.personal_best,
-            best_particle: swarm.best_particle,
-            best: swarm.best,
-            inertia: swarm.inertia,
-            c1: swarm.c1,
-            c2: swarm.c2,
-            evaluations: swarm.evaluations,
-            rejections: swarm.rejections,
-            end_points: Vec::new(),
-            best_configurations: unwrap(swarm.best_configurations),
-        }
-    }
+/// [`SearchStep`].
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "SearchStep")]
+struct SearchForm {
+    step: usize,
+    evaluations: u64,
+    budget: u64,
+    rejections: u64,
+    value: f64,
+    best: f64,
+    #[serde(with = "configurations")]
+    best_configurations: Vec<Vec<f64>>,
 }
 
 /// [`DesignOutcome`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Design {
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "DesignOutcome")]
+struct DesignForm {
     method: String,
     criterion: String,
     value: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     advice: Option<Advice>,
-    configurations: Vec<Configuration>,
+    #[serde(with = "configurations")]
+    configurations: Vec<Vec<f64>>,
     indexes: Indexes,
     indexes_all_parameters: Indexes,
     evenness_domains: EvennessDomains,
@@ -91,44 +152,4 @@ pub(super) struct Design {
     evaluations: u64,
     rejections: u64,
     stop: StopReason,
-}
-
-impl From<&DesignOutcome> for Design {
-    fn from(outcome: &DesignOutcome) -> Self {
-        Design {
-            method: outcome.method.clone(),
-            criterion: outcome.criterion.clone(),
-            value: outcome.value,
-            advice: outcome.advice,
-            configurations: wrap(&outcome.configurations),
-            indexes: outcome.indexes,
-            indexes_all_parameters: outcome.indexes_all_parameters,
-            evenness_domains: outcome.evenness_domains,
-            random: outcome.random.clone(),
-            dropped_parameters: outcome.dropped_parameters.clone(),
-            evaluations: outcome.evaluations,
-            rejections: outcome.rejections,
-            stop: outcome.stop,
-        }
-    }
-}
-
-impl From<Design> for DesignOutcome {
-    fn from(design: Design) -> Self {
-        DesignOutcome {
-            method: design.method,
-            criterion: design.criterion,
-            value: design.value,
-            advice: design.advice,
-            configurations: unwrap(design.configurations),
-            indexes: design.indexes,
-            indexes_all_parameters: design.indexes_all_parameters,
-            evenness_domains: design.evenness_domains,
-            random: design.random,
-            dropped_parameters: design.dropped_parameters,
-            evaluations: design.evaluations,
-            rejections: design.rejections,
-            stop: design.stop,
-        }
-    }
 }

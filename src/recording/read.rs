@@ -13,10 +13,10 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 use mcap::{MAGIC, McapError};
 use prost::Message as _;
 
+use super::cloud;
 use super::event::{Event, Start};
+use super::json::Source;
 use super::topic::Topic;
-use super::{cloud, json};
-use crate::design::outcome::{DesignOutcome, SwarmIteration};
 
 /// Longest record and longest chunk after decompression that is accepted, bytes: a damaged length must not fill the memory.
 const RECORD_LIMIT: usize = 256 * 1024 * 1024;
@@ -486,10 +486,9 @@ pub fn read(path: &Path) -> Result<Recording, ReadError> {
         message_count += 1;
         let event = match message.topic() {
             Some(Topic::Run) => parse(&message.data).map(Event::Start),
-            Some(Topic::Swarm) => parse::<json::Swarm>(&message.data).map(|swarm| Event::Swarm(SwarmIteration::from(swarm))),
-            Some(Topic::Design) => {
-                parse::<json::Design>(&message.data).map(|design| Event::Designed(DesignOutcome::from(design)))
-            }
+            Some(Topic::Swarm) => parse(&message.data).map(Event::Swarm),
+            Some(Topic::Search) => parse(&message.data).map(Event::Search),
+            Some(Topic::Design) => parse(&message.data).map(Event::Designed),
             Some(Topic::Measurement) => parse(&message.data).map(Event::Measured),
             Some(Topic::Identification) => parse(&message.data).map(Event::Identified),
             Some(Topic::Log) => {
@@ -516,8 +515,8 @@ pub fn read(path: &Path) -> Result<Recording, ReadError> {
     Ok(Recording { start, events, message_count, cut: messages.cut(), version_warning })
 }
 
-fn parse<T: serde::de::DeserializeOwned>(data: &[u8]) -> Result<T, String> {
-    serde_json::from_slice(data).map_err(|error| error.to_string())
+fn parse<T: Source>(data: &[u8]) -> Result<T, String> {
+    T::from_json(data).map_err(|error| error.to_string())
 }
 
 fn version_warning(path: &Path, recorded: &str) -> Option<String> {

@@ -11,13 +11,14 @@ use super::event::RealCell;
 use super::topic::Topic;
 use super::*;
 use crate::arm::{Arm, Fixture, Geometry, Link, Shape};
-use crate::design::outcome::{DesignOutcome, EvennessDomains, RandomReference, StopReason, SwarmIteration};
+use crate::design::outcome::{Advice, DesignOutcome, EvennessDomains, RandomReference, SearchStep, StopReason, SwarmIteration};
 use crate::frames::{Pose, pose_error};
 use crate::identification::outcome::{Combination, DeclaredNoise, Errors, Identification, ParameterEstimate, Residual, Summary};
 use crate::kinematics::chain::{Joint, JointKind};
 use crate::kinematics::mdh;
 use crate::measurement::{Measurement, Role};
 use crate::quality::Indexes;
+use crate::quality::prediction::Prediction;
 use crate::seed::{Stream, stream};
 
 const JOINTS: usize = 6;
@@ -129,6 +130,9 @@ fn events(size: &Size) -> Vec<Event> {
     }
     events.push(Event::Designed(DesignOutcome {
         method: "pso".to_owned(),
+        criterion: "comprehensive".to_owned(),
+        value: stream.uniform(0.0, 1.0),
+        advice: None,
         configurations: configurations(&mut stream, size.configurations),
         indexes: indexes(&mut stream),
         indexes_all_parameters: indexes(&mut stream),
@@ -205,6 +209,51 @@ fn events(size: &Size) -> Vec<Event> {
     events
 }
 
+/// The same run with a search of `steps` steps in place of the swarm, and advice.
+fn searched(size: &Size, steps: usize) -> Vec<Event> {
+    let mut stream = stream(13, "test/recording/search");
+    let mut search: Vec<Event> = (0..steps)
+        .map(|step| {
+            Event::Search(SearchStep {
+                step,
+                evaluations: 17 * step as u64 + 1,
+                budget: 20_000,
+                rejections: step as u64,
+                // As hopeless as a set can be at first.
+                value: if step == 0 { f64::MIN } else { stream.uniform(10.0, 20.0) },
+                best: if step == 0 { f64::MIN } else { stream.uniform(20.0, 21.0) },
+                best_configurations: if step % 4 == 0 { configurations(&mut stream, size.configurations) } else { Vec::new() },
+            })
+        })
+        .collect();
+    let mut rest = events(size);
+    rest.retain(|event| !matches!(event, Event::Swarm(_)));
+    for event in &mut rest {
+        if let Event::Designed(outcome) = event {
+            outcome.method = "coordinate_exchange".to_owned();
+            outcome.criterion = "i_optimality".to_owned();
+            outcome.stop = StopReason::BudgetSpent;
+            let prediction = |scale: f64| Prediction {
+                position_rms_m: 1e-5 * scale / 3.0,
+                attitude_rms_rad: 1e-5 / 7.0,
+                position_worst_m: 4e-5 / 3.0,
+            };
+            outcome.advice = Some(Advice {
+                chosen: Some(prediction(1.0)),
+                random: Some(prediction(1.5)),
+                random_range_m: [1e-5 / 3.0, 1e-5],
+                random_undetermined: 2,
+                bound_m: 0.9e-5 / 3.0,
+                bound_gap: 1e-4,
+                bound_candidates: 1000,
+            });
+        }
+    }
+    let designed = rest.iter().position(|event| matches!(event, Event::Designed(_))).unwrap();
+    rest.splice(designed..designed, search.drain(..));
+    rest
+}
+
 fn record(directory: &Path, events: &[Event]) -> PathBuf {
     let mut recorder = Recorder::create(directory, "run", &arm()).unwrap();
     for event in events {
@@ -233,6 +282,69 @@ fn events_come_back_bit_for_bit() {
     assert!(recording.is_complete(), "{:?}", recording.cut);
     assert_eq!(recording.version_warning, None);
     assert_same(&recording.events, &events);
+}
+
+#[test]
+fn a_search_comes_back_bit_for_bit_whole_or_cut_off_and_replays() {
+    let directory = tempfile::tempdir().unwrap();
+    let events = searched(&SMALL, 23);
+    let path = record(directory.path(), &events);
+    let recording = read(&path).unwrap();
+    assert!(recording.is_complete(), "{:?}", recording.cut);
+    assert_same(&recording.events, &events);
+    let comparison = replay(&path, &events);
+    assert!(comparison.identical() && comparison.compared == recording.message_count, "{comparison:?}");
+
+    let bytes = fs::read(&path).unwrap();
+    let cut_path = directory.path().join("cut.mcap");
+    let mut counts = std::collections::BTreeSet::new();
+    for length in (0..bytes.len()).step_by(211) {
+        fs::write(&cut_path, &bytes[..length]).unwrap();
+        if let Ok(cut) = read(&cut_path) {
+            assert!(!cut.cut.unwrap().damaged);
+            assert_same(&cut.events, &events[..cut.events.len()]);
+            counts.insert(cut.events.len());
+        }
+    }
+    // Start; note and steps by tens; the design; measurements by sixteens; all but the end. Chunk by chunk.
+    assert_eq!(counts.into_iter().collect::<Vec<_>>(), [1, 12, 22, 26, 42, 48]);
+
+    type Change = fn(&mut Event);
+    let cases: [(usize, Change, &str); 3] = [
+        (
+            6,
+            |event| {
+                if let Event::Search(step) = event {
+                    next_up(&mut step.best)
+                }
+            },
+            "/design/search[4].best: recorded",
+        ),
+        (
+            6,
+            |event| {
+                if let Event::Search(step) = event {
+                    next_up(&mut step.best_configurations[2][5])
+                }
+            },
+            "/design/search[4].best_configurations[2].joints[5]: recorded",
+        ),
+        (
+            25,
+            |event| {
+                if let Event::Designed(outcome) = event {
+                    outcome.advice = None
+                }
+            },
+            "/design/outcome[0].advice: recorded {",
+        ),
+    ];
+    for (number, change, expected) in cases {
+        let mut altered = events.clone();
+        change(&mut altered[number]);
+        let difference = replay(&path, &altered).first_difference.unwrap().to_string();
+        assert!(difference.starts_with(expected), "{difference}, expected {expected}");
+    }
 }
 
 #[test]
@@ -486,6 +598,13 @@ fn what_cannot_be_read_back_is_refused() {
     let Event::Swarm(swarm) = &mut events[2] else { panic!() };
     swarm.fitness[3] = f64::NAN;
     assert!(refused(&events[2]).starts_with("/design/swarm: fitness is NaN or infinite"), "{}", refused(&events[2]));
+    let mut step = searched(&SMALL, 1).swap_remove(2);
+    let Event::Search(search) = &mut step else { panic!() };
+    search.best_configurations[1].push(0.0);
+    assert_eq!(refused(&step), "/design/search: a configuration has 7 joint coordinates, the arm has 6 joints");
+    let Event::Search(search) = &mut step else { panic!() };
+    search.value = f64::NEG_INFINITY;
+    assert!(refused(&step).starts_with("/design/search: value is NaN or infinite"), "{}", refused(&step));
     let Event::Measured(measurement) = &mut events[30] else { panic!() };
     measurement.joints.pop();
     assert_eq!(refused(&events[30]), "/measurement: a configuration has 5 joint coordinates, the arm has 6 joints");
@@ -689,7 +808,7 @@ fn check_schema(path: &str, schema: &Value, value: &Value) {
 fn json_messages_are_what_their_schemas_say() {
     let mut encoder = Encoder::new(&arm());
     let mut seen = std::collections::BTreeSet::new();
-    for event in events(&SMALL) {
+    for event in events(&SMALL).into_iter().chain(searched(&SMALL, 5)) {
         for message in encoder.encode(&event).unwrap() {
             seen.insert(message.topic);
             let schema = message.topic.schema();

@@ -21,7 +21,9 @@ pub enum Topic {
     Swarm,
     /// End points of every particle; belongs to [`Topic::Swarm`] and is recorded nowhere else.
     SwarmEndPoints,
-    /// End points of the swarm's best-known set, when it changes (nominal arm).
+    /// A step of a search by any other method.
+    Search,
+    /// End points of the best set so far, when it changes (nominal arm).
     BestEndPoints,
     /// The chosen set.
     Design,
@@ -60,13 +62,14 @@ pub struct Schema {
 
 impl Topic {
     /// Every topic, in the order of a run.
-    pub const ALL: [Topic; 18] = [
+    pub const ALL: [Topic; 19] = [
         Topic::Run,
         Topic::Shapes,
         Topic::ArmPoints,
         Topic::Transforms,
         Topic::Swarm,
         Topic::SwarmEndPoints,
+        Topic::Search,
         Topic::BestEndPoints,
         Topic::Design,
         Topic::Chosen,
@@ -91,6 +94,7 @@ impl Topic {
             Topic::Transforms => "/tf",
             Topic::Swarm => "/design/swarm",
             Topic::SwarmEndPoints => "/design/swarm/end_points",
+            Topic::Search => "/design/search",
             Topic::BestEndPoints => "/design/best/end_points",
             Topic::Design => "/design/outcome",
             Topic::Chosen => "/design/chosen",
@@ -124,6 +128,7 @@ impl Topic {
         match self {
             Topic::Run => "kincal.Run",
             Topic::Swarm => "kincal.SwarmIteration",
+            Topic::Search => "kincal.SearchStep",
             Topic::Design => "kincal.DesignOutcome",
             Topic::Measurement => "kincal.Measurement",
             Topic::Identification => "kincal.Identification",
@@ -163,6 +168,7 @@ impl Topic {
         match self {
             Topic::Run => Some(include_str!("schemas/run.json")),
             Topic::Swarm => Some(include_str!("schemas/swarm_iteration.json")),
+            Topic::Search => Some(include_str!("schemas/search_step.json")),
             Topic::Design => Some(include_str!("schemas/design_outcome.json")),
             Topic::Measurement => Some(include_str!("schemas/measurement.json")),
             Topic::Identification => Some(include_str!("schemas/identification.json")),
@@ -176,6 +182,7 @@ fn expand(template: &str) -> String {
     template
         .replace("\"@errors\"", include_str!("schemas/errors.json").trim_end())
         .replace("\"@summary\"", include_str!("schemas/summary.json").trim_end())
+        .replace("\"@prediction\"", include_str!("schemas/prediction.json").trim_end())
         .replace("\"@indexes\"", include_str!("schemas/indexes.json").trim_end())
         .replace("\"@configuration\"", include_str!("schemas/configuration.json").trim_end())
 }

@@ -16,8 +16,8 @@ use crate::arm::Arm;
 
 /// Uncompressed size at which a chunk is closed after the current event, bytes.
 const CHUNK_BYTES: usize = 1024 * 1024;
-/// Iterations of the swarm from one flush to the next.
-const SWARM_PER_FLUSH: usize = 10;
+/// Iterations or steps of the design from one flush to the next.
+const STEPS_PER_FLUSH: usize = 10;
 /// Measured configurations from one flush to the next.
 const MEASUREMENTS_PER_FLUSH: usize = 16;
 
@@ -75,7 +75,7 @@ pub struct Recorder {
     channels: BTreeMap<Topic, u16>,
     partial: PathBuf,
     finished: PathBuf,
-    swarm_since_flush: usize,
+    steps_since_flush: usize,
     measurements_since_flush: usize,
     bytes_since_flush: usize,
     output_failed: bool,
@@ -117,7 +117,7 @@ impl Recorder {
             channels: BTreeMap::new(),
             partial,
             finished,
-            swarm_since_flush: 0,
+            steps_since_flush: 0,
             measurements_since_flush: 0,
             bytes_since_flush: 0,
             output_failed: false,
@@ -161,18 +161,18 @@ impl Recorder {
             self.with_writer(|writer| writer.write_metadata(&Metadata { name: "kincal".to_owned(), metadata }))?;
         }
         match event {
-            Event::Swarm(_) | Event::Search(_) => self.swarm_since_flush += 1,
+            Event::Swarm(_) | Event::Search(_) => self.steps_since_flush += 1,
             Event::Measured(_) => self.measurements_since_flush += 1,
             _ => {}
         }
         let phase_ended = matches!(event, Event::Start(_) | Event::Designed(_) | Event::Identified(_));
         if phase_ended
-            || self.swarm_since_flush >= SWARM_PER_FLUSH
+            || self.steps_since_flush >= STEPS_PER_FLUSH
             || self.measurements_since_flush >= MEASUREMENTS_PER_FLUSH
             || self.bytes_since_flush >= CHUNK_BYTES
         {
             self.with_writer(Writer::flush)?;
-            (self.swarm_since_flush, self.measurements_since_flush, self.bytes_since_flush) = (0, 0, 0);
+            (self.steps_since_flush, self.measurements_since_flush, self.bytes_since_flush) = (0, 0, 0);
         }
         Ok(())
     }

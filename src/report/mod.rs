@@ -1,4 +1,9 @@
-//! Results as tables for people. Units are in the headers; machines get the same results as JSON.
+//! Results as tables and figures for people. Units are in the headers; machines get the same results as JSON.
+
+pub mod figure;
+
+mod advice;
+pub mod criterion;
 
 use comfy_table::{Cell, CellAlignment, LineStyle, Table, TableStyle};
 
@@ -6,6 +11,7 @@ use crate::design::outcome::{DesignOutcome, StopReason};
 use crate::identification::outcome::{Errors, Identification, Summary};
 use crate::quality::Indexes;
 use crate::scene::JacobianScaling;
+use criterion::Words;
 
 /// Lines above and below, and one under the header.
 const STYLE: TableStyle = TableStyle::new()
@@ -68,13 +74,16 @@ pub fn design(outcome: &DesignOutcome, parameter_count: usize, scaling: Jacobian
     let mut text = table(&["index", &random, "min … max", "chosen", &all], rows);
     let dropped = if outcome.dropped_parameters.is_empty() { "none".to_owned() } else { outcome.dropped_parameters.join(", ") };
     text.push_str(&format!(
-        "\n{} configurations by {}: {} evaluations, {} colliding configurations refused, stopped: {}.\n\
+        "\n{} configurations by {} on {}: {}.\n\
+         {} evaluations of the criterion; {} configurations refused (they collide or the sensor does not see them); stopped: {}.\n\
          Identifiable: {} of {parameter_count} parameters; held at nominal: {dropped}.\n\
          Singular values are of the Jacobian (scaling: {scaling}) on the identifiable subspace; the last column counts all \
          {parameter_count}.\n\
          Evenness: reachable workspace {:.3}, bounding cube {:.3}.\n",
         outcome.configurations.len(),
         outcome.method,
+        outcome.criterion,
+        Words::of(&outcome.criterion).value(outcome.value),
         outcome.evaluations,
         outcome.rejections,
         stop(outcome.stop),
@@ -82,6 +91,9 @@ pub fn design(outcome: &DesignOutcome, parameter_count: usize, scaling: Jacobian
         outcome.evenness_domains.reachable,
         outcome.evenness_domains.bounding_cube,
     ));
+    if let Some(advice) = &outcome.advice {
+        text.push_str(&advice::section(outcome, advice));
+    }
     text
 }
 
@@ -225,7 +237,7 @@ pub fn number(value: f64) -> String {
 /// Table 4 of the paper beside ours.
 #[must_use]
 pub fn count_error(rows: &[crate::experiments::count_error::Row]) -> String {
-    use crate::experiments::count_error::Mean;
+    use crate::experiments::statistics::Mean;
     let value = |mean: &Option<Mean>, factor: f64| mean.map_or_else(|| "–".to_owned(), |mean| number(mean.mean * factor));
     let interval = |mean: &Option<Mean>, factor: f64| match mean.and_then(|mean| mean.interval95) {
         Some([low, high]) => format!("{} … {}", number(low * factor), number(high * factor)),

@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::error::{Invalid, suggestion};
 use super::file::*;
+use super::urdf;
 use super::{
     DesignProblem, EvennessDomain, Injected, JacobianScaling, JointClearance, Noise, Plan, Scene, Swarm, Thermal, ThermalProfile,
     Weights,
@@ -12,8 +13,8 @@ use crate::arm::{Arm, Fixture, Geometry, Inertial, Link, Shape};
 use crate::frames::Pose;
 use crate::kinematics::mdh::{self, Frame, SixParameters};
 use crate::kinematics::urdf::rpy::{rotation_from_rpy, z_onto};
-use crate::kinematics::{Joint, JointKind, Quantity};
-use crate::measurement::Sensor;
+use crate::kinematics::{Chain, Joint, JointKind, Quantity, Step};
+use crate::measurement::{Sensor, View};
 
 type Checked<T> = Result<T, Invalid>;
 
@@ -35,7 +36,7 @@ pub(super) fn scene(file: &SceneToml) -> Checked<Scene> {
         c.is_ascii_lowercase() || c.is_ascii_digit() || matches!(c, '-' | '_')
     })?;
     seed(file.seed, "seed")?;
-    let arm = arm(&file.arm)?;
+    let (arm, urdf_notes) = arm(&file.arm)?;
     let sensor = sensor(&file.sensor)?;
     let weights = match file.identification.weights {
         WeightsToml::Noise => Weights::Noise,
@@ -61,6 +62,7 @@ pub(super) fn scene(file: &SceneToml) -> Checked<Scene> {
         name: file.name.clone(),
         description: file.description.clone(),
         arm_note: file.arm.note.clone(),
+        urdf_notes,
         sensor_name: file.sensor.name.clone(),
         seed: file.seed,
         arm,
@@ -133,15 +135,18 @@ fn declared_noise(value: f64, key: &str) -> Checked<f64> {
 fn reach(arm: &Arm) -> f64 {
     let lengths = arm.chain.parameters.iter().filter(|parameter| parameter.quantity == Quantity::Length);
     let slides = arm.chain.joints.iter().filter(|joint| joint.kind == JointKind::Prismatic);
+    let fixed = arm.chain.steps.iter().filter_map(|step| match step {
+        Step::Fixed(pose) => Some(pose.translation.vector.norm()),
+        _ => None,
+    });
     lengths.map(|length| length.nominal.abs()).sum::<f64>()
+        + fixed.sum::<f64>()
         + slides.map(|joint| joint.lower.abs().max(joint.upper.abs())).sum::<f64>()
 }
 
-fn arm(file: &ArmToml) -> Checked<Arm> {
-    let Convention::Mdh5 = file.convention;
-    name(&file.name, "arm.name", "the exported URDF's robot is called so", &|c| {
-        c.is_ascii_alphanumeric() || matches!(c, '-' | '_')
-    })?;
+/// Chain and links of an arm that the scene writes frame by frame.
+fn mdh5(file: &ArmToml) -> Checked<(Chain, Vec<Link>)> {
+    urdf::without(file)?;
     let Some((tool, jointed)) = file.frame.split_last().filter(|(_, jointed)| !jointed.is_empty()) else {
         return Err(Invalid::new(
             "arm.frame",
@@ -203,7 +208,18 @@ fn arm(file: &ArmToml) -> Checked<Arm> {
         })
         .collect();
     let six = |six: &SixToml| SixParameters { xyz: six.xyz_mm.map(metres_from_mm), rpy: six.rpy_deg.map(f64::to_radians) };
-    let chain = mdh::chain(&frames, joints, file.base.as_ref().map(six), file.tool.as_ref().map(six));
+    Ok((mdh::chain(&frames, joints, file.base.as_ref().map(six), file.tool.as_ref().map(six)), links))
+}
+
+/// The arm, and what of its URDF could not be taken over.
+fn arm(file: &ArmToml) -> Checked<(Arm, Vec<String>)> {
+    name(&file.name, "arm.name", "the exported URDF's robot is called so", &|c| {
+        c.is_ascii_alphanumeric() || matches!(c, '-' | '_')
+    })?;
+    let (chain, links, notes) = match file.convention {
+        Convention::Mdh5 => mdh5(file).map(|(chain, links)| (chain, links, Vec::new()))?,
+        Convention::Urdf => urdf::arm(file).map(|imported| (imported.arm.chain, imported.arm.links, imported.notes))?,
+    };
     let mut fixtures: Vec<Fixture> = Vec::with_capacity(file.fixture.len());
     for (index, fixture) in file.fixture.iter().enumerate() {
         let key = format!("arm.fixture[{}]", index + 1);
@@ -230,7 +246,8 @@ fn arm(file: &ArmToml) -> Checked<Arm> {
     }
     uncollidable.sort_unstable();
     uncollidable.dedup();
-    Ok(Arm { name: file.name.clone(), chain, links, fixtures, uncollidable, gravity_in_base: Vector3::from(file.gravity_m_s2) })
+    let gravity_in_base = Vector3::from(file.gravity_m_s2);
+    Ok((Arm { name: file.name.clone(), chain, links, fixtures, uncollidable, gravity_in_base }, notes))
 }
 
 fn link_index(name: &str, links: &[Link], key: &str) -> Checked<usize> {
@@ -390,7 +407,29 @@ fn sensor(file: &SensorToml) -> Checked<Sensor> {
             .temperature_noise_k
             .map(|sigma| not_negative(sigma, "sensor.temperature_noise_k"))
             .transpose()?,
+        view: file.view.as_ref().map(|view| self::view(view, &file.position_mm)).transpose()?,
     })
+}
+
+fn view(file: &ViewToml, position_mm: &[f64; 3]) -> Checked<View> {
+    if file.towards_mm == *position_mm {
+        return Err(Invalid::new(
+            "sensor.view.towards_mm",
+            format!("{:?}, where the sensor stands", file.towards_mm),
+            "another point than sensor.position_mm: the axis of the cone runs through both",
+            "give a point that the sensor looks at, such as the middle of the workspace",
+        ));
+    }
+    let half_angle_deg = file.half_angle_deg;
+    if !(half_angle_deg > 0.0 && half_angle_deg <= 180.0) {
+        return Err(Invalid::new(
+            "sensor.view.half_angle_deg",
+            half_angle_deg.to_string(),
+            "more than 0, 180 at most",
+            "give the angle between the axis and the edge of the cone",
+        ));
+    }
+    Ok(View { towards_in_base: point_from_mm(&file.towards_mm), half_angle_rad: half_angle_deg.to_radians() })
 }
 
 fn design(file: &DesignToml, arm: &Arm, sensor: &Sensor) -> Checked<DesignProblem> {

@@ -212,7 +212,12 @@ pub(super) fn in_our_words(message: &str, key: String) -> Invalid {
         .iter()
         .find_map(|kind| message.strip_prefix(kind)?.split_once(", expected "))
     {
-        return Invalid::new(key, found, in_plain_words(expected), "give a value of the allowed kind");
+        // What `identify --base-link` takes is tried here too.
+        let remedy = match key.as_str() {
+            "arm.base_link" => "did you mean `urdf_base_link`? base_link is the table of a link",
+            _ => "give a value of the allowed kind",
+        };
+        return Invalid::new(key, found, in_plain_words(expected), remedy);
     }
     let names = quoted(&message);
     match names.split_first() {
@@ -282,7 +287,8 @@ pub(super) fn suggestion<'a>(found: &str, allowed: impl IntoIterator<Item = &'a 
             let says = if says.is_empty() { String::new() } else { format!(" {says} here") };
             return Some(format!("did you mean `{name}`?{says}"));
         }
-        let distance = if found.len() > 2 && name.starts_with(found) { 1 } else { edits(found, name) };
+        let is_part = found.len() > 2 && (name.starts_with(found) || name.ends_with(found));
+        let distance = if is_part { 1 } else { edits(found, name) };
         if best.is_none_or(|(least, _)| distance < least) {
             best = Some((distance, name));
         }

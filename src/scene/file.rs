@@ -54,6 +54,18 @@ pub struct ArmToml {
     pub name: String,
     /// How the frames are written.
     pub convention: Convention,
+    /// With `urdf`: file that holds the arm, relative to the scene's folder. Reading the scene puts its text into `urdf`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub urdf_file: Option<String>,
+    /// With `urdf`: the text itself, `'''<robot …>'''`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub urdf: Option<String>,
+    /// With `urdf`: link at which the arm begins. Default: the root.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub urdf_base_link: Option<String>,
+    /// With `urdf`: link at which it ends. Default: the only leaf.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub urdf_tip_link: Option<String>,
     /// Where the numbers come from; printed in every report.
     #[serde(default)]
     pub note: String,
@@ -72,7 +84,8 @@ pub struct ArmToml {
     /// What stands still before joint 1; its frame is the one in which frame 1 is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base_link: Option<LinkToml>,
-    /// `[[arm.frame]]`: one per joint, base to tool, then the tool's.
+    /// `[[arm.frame]]`: one per joint, base to tool, then the tool's. None with `urdf`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub frame: Vec<FrameToml>,
     /// `[[arm.fixture]]`: bodies of the cell.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -89,6 +102,9 @@ pub enum Convention {
     /// `Rot(x, alpha) Trans(x, a) Rot(z, theta) Trans(z, d) Rot(y, beta)`; see [`crate::kinematics::mdh`].
     #[serde(rename = "mdh5")]
     Mdh5,
+    /// A URDF, with six parameters for every joint that moves and for the tool; see [`crate::kinematics::urdf::import`].
+    #[serde(rename = "urdf")]
+    Urdf,
 }
 
 /// The six parameters of a frame.
@@ -248,7 +264,7 @@ pub struct SphereToml {
 pub struct FixtureToml {
     /// Name for messages, unique.
     pub name: String,
-    /// Links that may touch it: `base_link`, `link1`, … Default: none.
+    /// Links that may touch it: `base_link`, `link1`, …, or as the URDF calls them. Default: none.
     #[serde(default)]
     pub may_touch: Vec<String>,
     /// The shape.
@@ -274,6 +290,19 @@ pub struct SensorToml {
     /// Noise of the temperature sensors on the moving links, K. Absent: there are none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_noise_k: Option<f64>,
+    /// The cone that it sees, its apex where it stands. Absent: it sees everything.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub view: Option<ViewToml>,
+}
+
+/// `sensor.view`: a cone.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ViewToml {
+    /// A point on its axis, in the base frame, mm.
+    pub towards_mm: [f64; 3],
+    /// Between its axis and its edge, degrees: more than 0, 180 (everything) at most.
+    pub half_angle_deg: f64,
 }
 
 /// `[design]`: how many configurations are measured and how they are chosen.

@@ -7,6 +7,7 @@ mod magnitude;
 mod reader;
 #[cfg(test)]
 mod tests;
+mod urdf;
 
 pub use error::{Problem, SceneError};
 pub use reader::{SceneFile, parse, parse_injected, read};
@@ -25,6 +26,8 @@ pub struct Scene {
     pub description: String,
     /// Where the arm's numbers come from; belongs into every report.
     pub arm_note: String,
+    /// What of the arm's URDF could not be taken over as it stands; empty for other arms.
+    pub urdf_notes: Vec<String>,
     /// What the sensor is.
     pub sensor_name: String,
     /// Public seed: of the design, the held-out configurations and the order of measuring.
@@ -173,6 +176,12 @@ impl Criterion {
         Criterion::IOptimality,
         Criterion::GOptimality,
     ];
+
+    /// The criterion with this name.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Criterion> {
+        Criterion::ALL.into_iter().find(|criterion| criterion.name() == name)
+    }
 
     /// The criterion's name in scenes and results.
     #[must_use]

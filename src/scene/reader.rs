@@ -1,6 +1,6 @@
 //! Reading scenes, overriding values, and writing the public part.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -9,7 +9,7 @@ use super::convert;
 use super::error::{Invalid, Located, Problem, SceneError, in_our_words};
 use super::file::{InjectedOnlyToml, SceneToml, WeightsToml};
 use super::magnitude::too_large;
-use super::{Injected, Method, Scene};
+use super::{Injected, Method, Scene, urdf};
 use crate::arm::Arm;
 
 /// A scene as read: validated, with the file's own values kept for writing them again.
@@ -20,6 +20,8 @@ pub struct SceneFile {
     /// What it may not; absent in a public scene.
     pub injected: Option<Injected>,
     toml: SceneToml,
+    /// Where `arm.urdf_file` is looked for; `None` for a text that no file holds.
+    folder: Option<PathBuf>,
 }
 
 /// Reads and validates the scene file at `path`.
@@ -28,14 +30,18 @@ pub struct SceneFile {
 /// If the file cannot be read or is not a valid scene; the message names line, key, what was found and what is allowed.
 pub fn read(path: &Path) -> Result<SceneFile, SceneError> {
     let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
-    parse(&text, &path.display().to_string())
+    in_folder(&text, &path.display().to_string(), path.parent())
 }
 
 /// Validates the scene `text`; `origin` is what messages call it.
 ///
 /// # Errors
-/// If it is not a valid scene.
+/// If it is not a valid scene, or names a URDF by its file: only [`read`] knows where to look for it.
 pub fn parse(text: &str, origin: &str) -> Result<SceneFile, SceneError> {
+    in_folder(text, origin, None)
+}
+
+fn in_folder(text: &str, origin: &str, folder: Option<&Path>) -> Result<SceneFile, SceneError> {
     if text.trim_start().starts_with('<') {
         return Err(SceneError::Invalid(Box::new(Problem {
             origin: origin.to_owned(),
@@ -43,13 +49,15 @@ pub fn parse(text: &str, origin: &str) -> Result<SceneFile, SceneError> {
             key: String::new(),
             found: "XML, such as a URDF".to_owned(),
             allowed: "a scene in TOML".to_owned(),
-            remedy: "give a scene such as scenes/arm8.toml; a URDF goes with a table to `kincal identify TABLE --robot URDF`"
-                .to_owned(),
+            remedy:
+                "give a scene such as scenes/arm8.toml; a URDF goes with a table to `kincal identify TABLE --robot URDF`, or \
+                     into a scene such as scenes/panda.toml"
+                    .to_owned(),
         })));
     }
     let located = Located::parse(text, origin)?;
     let toml: SceneToml = deserialise(text, &located, origin)?;
-    validated(toml).map_err(|invalid| located.error(invalid, origin))
+    validated(toml, folder).map_err(|invalid| located.error(invalid, origin))
 }
 
 /// Validates the text of an injected section alone, as [`SceneFile::injected_toml`] writes it, against the arm it is about.
@@ -69,14 +77,21 @@ fn deserialise<T: DeserializeOwned>(text: &str, located: &Located<'_>, origin: &
     toml::from_str(text).map_err(|error| located.deserialise_error(&error, origin))
 }
 
-fn validated(toml: SceneToml) -> Result<SceneFile, Invalid> {
+fn validated(mut toml: SceneToml, folder: Option<&Path>) -> Result<SceneFile, Invalid> {
+    let urdf_file = urdf::inline(&mut toml.arm, folder)?;
     // What TOML cannot write, such as a seed of 64 bits, is refused by name below.
     if let Some(invalid) = toml::Value::try_from(&toml).ok().and_then(|value| too_large(&value, "")) {
         return Err(invalid);
     }
-    let scene = convert::scene(&toml)?;
+    let scene = convert::scene(&toml).map_err(|invalid| match urdf_file {
+        // The key that the scene has; the line is that of the other file.
+        Some(file) if invalid.key == "arm.urdf" => {
+            Invalid { key: "arm.urdf_file".to_owned(), found: format!("{file}, {}", invalid.found), ..invalid }
+        }
+        _ => invalid,
+    })?;
     let injected = toml.injected.as_ref().map(|injected| convert::injected(injected, &scene.arm)).transpose()?;
-    Ok(SceneFile { scene, injected, toml })
+    Ok(SceneFile { scene, injected, toml, folder: folder.map(Path::to_owned) })
 }
 
 impl SceneFile {
@@ -176,6 +191,12 @@ impl SceneFile {
         let table = toml::from_str::<toml::Table>(&assignment).ok().filter(|table| table.len() == 1);
         let value = table.and_then(|mut table| table.remove("value"));
         let mut root = toml::Value::try_from(&self.toml)?;
+        if key == "arm.urdf_file"
+            && let Some(arm) = root.get_mut("arm").and_then(toml::Value::as_table_mut)
+        {
+            // The text that is there is the other file's.
+            arm.remove("urdf");
+        }
         let place = place(&mut root, key).map_err(|invalid| invalid.at(&origin, None))?;
         match (place, value) {
             (Place::Key(table, name), Some(value)) => {
@@ -188,7 +209,7 @@ impl SceneFile {
         }
         let toml: SceneToml =
             root.try_into().map_err(|error: toml::de::Error| in_our_words(error.message(), key.to_owned()).at(&origin, None))?;
-        *self = validated(toml).map_err(|invalid| invalid.at(&origin, None))?;
+        *self = validated(toml, self.folder.as_deref()).map_err(|invalid| invalid.at(&origin, None))?;
         Ok(())
     }
 
@@ -196,7 +217,7 @@ impl SceneFile {
         let mut toml = self.toml.clone();
         change(&mut toml);
         let shown = || serde_json::to_string(value).unwrap_or_else(|_| "…".to_owned());
-        *self = validated(toml).map_err(|invalid| invalid.at(&origin_of(key, &shown()), None))?;
+        *self = validated(toml, self.folder.as_deref()).map_err(|invalid| invalid.at(&origin_of(key, &shown()), None))?;
         Ok(())
     }
 }

@@ -5,10 +5,18 @@ use nalgebra::{DMatrix, Point3, Vector3};
 use super::*;
 use crate::arm::Geometry;
 use crate::kinematics::Quantity;
+use crate::quality::subspace::Subspace;
 use crate::seed::{Stream, stream};
+use crate::self_collision::{CollisionCheck, Scratch};
 
 const ARM8: &str = include_str!("../../scenes/arm8.toml");
 const PAPER: &str = include_str!("../../scenes/paper.toml");
+const PANDA: &str = include_str!("../../scenes/panda.toml");
+const PANDA_URDF: &str = include_str!("../../scenes/panda.urdf");
+/// Every method and every criterion, as an error names them.
+const METHODS: &str =
+    "pso, improved_pso, detmax, annealing, genetic, genetic_repeated, perturbation, coordinate_exchange, best_of_random, random";
+const CRITERIA: &str = "comprehensive, o1, o2, o3, o4, o5, o6, dispersion, evenness, d_optimality, i_optimality, g_optimality";
 
 fn shipped() -> [(SceneFile, &'static str); 2] {
     [("arm8.toml", ARM8), ("paper.toml", PAPER)].map(|(name, text)| match parse(text, name) {
@@ -67,7 +75,7 @@ fn what_is_wrong_is_named_with_line_key_and_remedy() {
         ("seed = 2019", 0, "seed = -1", &["seed", "a whole number, not negative"]),
         ("count = 40", 0, "count = 40.5", &["design.count", "a whole number, not negative"]),
         ("gravity_m_s2 = [0, 0, -9.81]", 0, "gravity_m_s2 = [0, -9.81]", &["arm.gravity_m_s2", "a list of three numbers"]),
-        ("method = \"pso\"", 0, "method = \"psa\"", &["design.method", "`psa`", "pso, random", "did you mean `pso`?"]),
+        ("method = \"pso\"", 0, "method = \"psa\"", &["design.method", "`psa`", METHODS, "did you mean `pso`?"]),
         (
             "profile = \"heat-and-cool\"",
             0,
@@ -205,6 +213,21 @@ fn the_public_part_parses_back_to_the_same_scene_and_hides_the_rest() {
 }
 
 #[test]
+fn methods_and_criteria_go_by_the_names_that_errors_list() {
+    assert_eq!(Method::ALL.map(Method::name).join(", "), METHODS);
+    assert_eq!(Criterion::ALL.map(Criterion::name).join(", "), CRITERIA);
+    let [(mut file, _), _] = shipped();
+    for method in Method::ALL {
+        file.set("design.method", &format!("{:?}", method.name())).expect("allowed");
+        assert_eq!(file.scene.design.method, method);
+    }
+    for criterion in Criterion::ALL {
+        file.set("design.criterion", &format!("{:?}", criterion.name())).expect("allowed");
+        assert_eq!(file.scene.design.criterion, criterion);
+    }
+}
+
+#[test]
 fn overrides_are_validated_and_written() {
     let [(mut file, _), _] = shipped();
     file.set_seed(7).expect("allowed");
@@ -232,7 +255,8 @@ fn overrides_are_validated_and_written() {
         (file.set("design.cuont", "9"), "override design.cuont = 9", "did you mean `count`?"),
         (file.set("desing.count", "9"), "override desing.count = 9", "no `desing` in this scene"),
         (file.set("design.method", "pso"), "override design.method = pso", "TOML"),
-        (file.set("design.method", "\"ga\""), "design.method", "pso, random"),
+        (file.set("design.method", "\"ga\""), "design.method", METHODS),
+        (file.set("design.criterion", "\"oc\""), "design.criterion", CRITERIA),
         (file.set("arm.frame[12].a_mm", "9"), "override arm.frame[12].a_mm = 9", "no `frame[12]`"),
     ];
     for (result, origin, fragment) in refused {
@@ -262,8 +286,13 @@ fn units_become_si_once() {
     assert_eq!(injected.length_error_m, 1e-3);
     let thermal = injected.thermal.as_ref().expect("thermal");
     assert_eq!((thermal.expansion_per_k[1], thermal.expansion_per_k.len(), thermal.rise_k[2]), (23e-6, 9, 10.0));
-    let uniform = Noise::Uniform { position_m: 0.002, attitude_rad: 0.0 };
-    assert_eq!(paper.injected.as_ref().expect("injected").noise, uniform);
+    let Noise::Uniform { position_m, attitude_rad } = paper.injected.as_ref().expect("injected").noise else {
+        panic!("the paper's noise is uniform")
+    };
+    assert_eq!(position_m, 0.002);
+    assert!((attitude_rad - 0.002).abs() < 1e-17);
+    let attitude_sigma_rad = paper.scene.sensor.attitude_sigma_rad.expect("poses");
+    assert!((attitude_sigma_rad - 0.002 / 3f64.sqrt()).abs() < 1e-17);
     assert!((paper.scene.sensor.position_sigma_m - 0.002 / 3f64.sqrt()).abs() < 1e-18);
     // Shapes: the ends that were given.
     let shape = &scene.arm.links[8].shapes[1];
@@ -420,5 +449,308 @@ fn collisions_bind_in_the_cell_and_hardly_in_the_papers_scene() {
         let name = file.scene.name.clone();
         let home = vec![0.0; 8];
         assert!(file.scene.arm.within_limits(&home), "{name}");
+    }
+}
+
+/// A scene of the repository's folder.
+fn of_folder(name: &str) -> SceneFile {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
+    read(&path).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// panda.toml with the URDF `urdf` in place of its file's name.
+fn with_urdf(urdf: &str) -> String {
+    assert!(!urdf.contains("'''"));
+    PANDA.replacen("urdf_file = \"panda.urdf\"", &format!("urdf = '''\n{urdf}'''"), 1)
+}
+
+#[test]
+fn an_arm_from_a_urdf_is_the_same_from_the_file_and_inline() {
+    let file = of_folder("panda.toml");
+    let inline = parse(&with_urdf(PANDA_URDF), "inline").unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(file.scene, inline.scene);
+    assert_eq!(file.toml().arm.urdf.as_deref(), Some(PANDA_URDF));
+    let arm = &file.scene.arm;
+    assert_eq!((arm.name.as_str(), arm.chain.parameters.len(), arm.joint_count()), ("panda", 48, 7));
+    assert_eq!(file.scene.urdf_notes, Vec::<String>::new());
+    assert!(arm.links[1..].iter().all(|link| link.inertial.as_ref().is_some_and(|inertial| inertial.impossible().is_none())));
+    assert!(arm.links.iter().all(|link| !link.shapes.is_empty()));
+
+    // What is public needs no file, and is what it was.
+    let public = file.public_toml().expect("it can be written");
+    assert!(!public.contains("urdf_file") && !public.contains("ab9fe3e0"));
+    let back = parse(&public, "public").unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(format!("{:?}", back.scene), format!("{:?}", file.scene));
+    assert_eq!(back.public_toml().expect("it can be written"), public);
+
+    // Whatever stands in the text.
+    for odd in ["\r\n", "\"\"\"", "\\u0041\t", "\u{7f} µ°", "''' \"\"\" \\"] {
+        let text = PANDA_URDF.replace("-->\n<robot", &format!("{odd}-->\n<robot"));
+        assert_ne!(text, PANDA_URDF);
+        let mut changed = file.clone();
+        changed.set("arm.urdf", &toml::Value::String(text.clone()).to_string()).unwrap_or_else(|error| panic!("{error}"));
+        let back = parse(&changed.public_toml().expect("it can be written"), "public").unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(back.toml().arm.urdf.as_deref(), Some(text.as_str()));
+    }
+}
+
+#[test]
+fn overrides_of_an_arm_from_a_urdf() {
+    let mut file = of_folder("panda.toml");
+    file.set_seed(7).expect("allowed");
+    file.set("arm.gravity_m_s2", "[0, 0, 9.81]").expect("allowed");
+    file.set("arm.uncollidable", "[[\"panda_link7\", \"panda_link5\"]]").expect("allowed");
+    file.set("injected.parameters.errors", "{ panda_joint4_x_mm = 1, tool_roll_deg = -0.5 }").expect("allowed");
+    file.set("injected.clearance", "[{ joint = \"panda_joint2\", radial_um = 30 }]").expect("allowed");
+    let fixture =
+        "{ name = \"floor\", may_touch = [\"panda_link0\"], shape = { sphere = { centre_mm = [0, 0, -90], radius_mm = 99 } } }";
+    file.set("arm.fixture", &format!("[{fixture}]")).expect("allowed");
+    assert_eq!(file.scene.arm.uncollidable, [(5, 7)]);
+    assert_eq!(file.scene.arm.fixtures[0].may_touch, [0]);
+    assert_eq!(file.scene.arm.gravity_in_base.z, 9.81);
+    let injected = file.injected.clone().expect("injected");
+    assert_eq!(injected.parameter_errors[0], ("panda_joint4_x".to_owned(), 1e-3));
+    assert_eq!(injected.clearances[0].joint, 1);
+    // The arm ends earlier: what hangs behind is frozen, and its links are none of the arm's.
+    let refused = file.set("arm.urdf_tip_link", "\"panda_link6\"").expect_err("link 7 is in uncollidable").to_string();
+    assert!(refused.contains("arm.uncollidable[1][1]") && refused.contains("did you mean `panda_link"), "{refused}");
+    file.set("arm.uncollidable", "[]").expect("allowed");
+    file.set("arm.urdf_tip_link", "\"panda_link6\"").expect("allowed");
+    assert_eq!(file.scene.arm.joint_count(), 6);
+    assert!(file.scene.urdf_notes[0].contains("joint panda_joint7 is not in the chain"), "{:?}", file.scene.urdf_notes);
+    // A file is looked for where the scene is, and takes the place of the text.
+    let refused = file.set("arm.urdf_file", "\"ur5.urdf\"").expect_err("there is none").to_string();
+    assert!(refused.contains("scenes/ur5.urdf: No such file") && refused.contains("relative to the scene's folder"), "{refused}");
+    file.set("arm.urdf_file", "\"panda.urdf\"").expect("allowed");
+    assert_eq!(file.toml().arm.urdf.as_deref(), Some(PANDA_URDF));
+}
+
+#[test]
+fn what_is_wrong_with_an_arm_from_a_urdf_is_named() {
+    let inline = with_urdf(PANDA_URDF);
+    let key = "urdf_file = \"panda.urdf\" # from this file's folder\n";
+    let frame = "[[arm.frame]]\nalpha_deg = 0\na_mm = 0\ntheta_deg = 0\nd_mm = 0\n[sensor]";
+    let six = "base = { xyz_mm = [0, 0, 0], rpy_deg = [0, 0, 0] }\nconvention = \"urdf\"";
+    let urdf = |old: &str, new: &str| {
+        assert!(PANDA_URDF.contains(old), "{old}");
+        with_urdf(&PANDA_URDF.replacen(old, new, 1))
+    };
+    let line_in_urdf =
+        |of: &str| format!("line {}: ", PANDA_URDF[..PANDA_URDF.find(of).expect("it is there")].matches('\n').count() + 1);
+    let joint1 = line_in_urdf("<joint name=\"panda_joint1\"");
+    let link2 = line_in_urdf("<link name=\"panda_link2\"");
+    let cases: &[(String, &[&str])] = &[
+        // Keys.
+        (PANDA.replacen(key, "", 1), &["arm.convention", "neither `urdf_file` nor `urdf`", "add `urdf_file"]),
+        (inline.replacen("urdf = ", &format!("{key}urdf = "), 1), &["arm.urdf_file", "`urdf_file` and `urdf`", "remove one"]),
+        (PANDA.to_owned(), &["arm.urdf_file", "\"panda.urdf\", but no folder", "write the text itself"]),
+        (inline.replacen("[sensor]", frame, 1), &["arm.frame", "with convention = \"urdf\"", "remove the key"]),
+        (inline.replacen("convention = \"urdf\"", six, 1), &["arm.base", "with convention = \"urdf\"", "the URDF's"]),
+        (inline.replacen("[sensor]", "[arm.base_link]\n[sensor]", 1), &["arm.base_link", "where it begins is urdf_base_link"]),
+        (inline.replacen("urdf = '", "base_link = 'foot'\nurdf = '", 1), &["arm.base_link", "did you mean `urdf_base_link`?"]),
+        (inline.replacen("urdf = '", "tip_link = 'nest'\nurdf = '", 1), &["arm.tip_link", "did you mean `urdf_tip_link`?"]),
+        (inline.replacen("urdf = '", "urdf_tip = 'nest'\nurdf = '", 1), &["arm.urdf_tip", "did you mean `urdf_tip_link`?"]),
+        (PANDA.replacen("urdf_file = \"panda.urdf\"", "urdf = 5", 1), &["arm.urdf", "a string"]),
+        (ARM8.replacen("note = ", "urdf_file = \"x\"\nnote = ", 1), &["arm.urdf_file", "with convention = \"mdh5\""]),
+        (ARM8.replacen("note = ", "urdf_tip_link = \"x\"\nnote = ", 1), &["arm.urdf_tip_link", "set convention = \"urdf\""]),
+        (inline.replacen("\"urdf\"", "\"dh\"", 1), &["arm.convention", "`dh`", "mdh5, urdf"]),
+        // Links.
+        (
+            inline.replacen("urdf = '", "urdf_tip_link = 'tip'\nurdf = '", 1),
+            &["arm.urdf_tip_link", "no link \"tip\"", "panda_flange", "do: give one of these to urdf_tip_link"],
+        ),
+        (inline.replacen("urdf = '", "urdf_base_link = 'foot'\nurdf = '", 1), &["arm.urdf_base_link", "no link \"foot\""]),
+        (
+            urdf("<link name=\"nest\"/>", "<link name=\"nest\"/><link name=\"lost\"/>"),
+            &["arm.urdf", "links that no joint connects", "urdf_base_link"],
+        ),
+        // The text.
+        (
+            urdf("<limit lower=\"-2.8973\" upper=\"2.8973\" ", "<limit "),
+            &["arm.urdf", &joint1, "joint \"panda_joint1\": no limits", "do: add <limit"],
+        ),
+        (urdf("</link>", "</lnik>"), &["arm.urdf", "`</lnik>`", "well-formed XML"]),
+        (inline.replacen("<robot", "<!-- <robot", 1), &["arm.urdf"]),
+        (urdf("<mass value=\"0.646926\"/>", "<mass value=\"-1\"/>"), &["arm.urdf", &link2, "link \"panda_link2\": mass -1"]),
+        (
+            urdf("<mass value=\"0.646926\"/>", "<mass value=\"1e300\"/>"),
+            &["arm.urdf", "link \"panda_link2\": mass 1", "100000 kg at most"],
+        ),
+        (urdf("xyz=\"0 -0.316 0\"", "xyz=\"0 -316 0\""), &["arm.urdf", "panda_joint3_y -316 m", "100 m at most"]),
+        (urdf("lower=\"-1.7628\"", "lower=\"-1e9\""), &["arm.urdf", "joint \"panda_joint2\": limit", "rad at most"]),
+        (
+            urdf(
+                "ixx=\"0.00315\" ixy=\"8.2904e-07\" ixz=\"0.00015\" iyy=\"0.00388\" iyz=\"8.2299e-06\" izz=\"0.004285\"",
+                "ixx=\"1e9\" ixy=\"0\" ixz=\"0\" iyy=\"1e9\" iyz=\"0\" izz=\"1e9\"",
+            ),
+            &["arm.urdf", "link \"panda_link0\": inertia 1000000000 kg", "check the number"],
+        ),
+        (urdf("cylinder radius=\"0.06\"", "cylinder radius=\"1e9\""), &["arm.urdf", "a shape of"]),
+        (
+            inline.replacen("note = ", "uncollidable = [[\"link1\", \"link3\"]]\nnote = ", 1),
+            &["arm.uncollidable[1][1]", "\"link1\"", "panda_link0, panda_link1"],
+        ),
+        (inline.replacen("count = 40", "count = 7", 1), &["design.count", "8 or more", "48 parameters"]),
+    ];
+    for (text, expected) in cases {
+        let message = message(text);
+        for fragment in expected.iter().copied().chain(["cell.toml:", "\n  found: ", "\n  do: "]) {
+            assert!(message.contains(fragment), "{fragment:?} is not in\n{message}");
+        }
+        assert!(!message.contains("--tip-link") && !message.contains("--base-link"), "{message}");
+    }
+}
+
+#[test]
+fn what_is_wrong_in_a_urdf_file_is_named_with_both_files() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = folder.path().join("cell.toml");
+    std::fs::write(&scene, PANDA).expect("written");
+    let message = || read(&scene).expect_err("refused").to_string();
+    let key = format!(
+        "cell.toml:{}:1: arm.urdf_file",
+        PANDA[..PANDA.find("urdf_file").expect("it is there")].matches('\n').count() + 1
+    );
+    let missing = message();
+    assert!(missing.contains(&key) && missing.contains("panda.urdf: No such file"), "{missing}");
+    std::fs::write(folder.path().join("panda.urdf"), PANDA_URDF.replacen("type=\"revolute\"", "type=\"planar\"", 1))
+        .expect("written");
+    let line = PANDA_URDF[..PANDA_URDF.find("<joint").expect("joints")].matches('\n').count() + 1;
+    let wrong = message();
+    assert!(wrong.contains(&key) && wrong.contains(&format!("panda.urdf, line {line}: joint \"panda_joint1\"")), "{wrong}");
+    std::fs::write(folder.path().join("panda.urdf"), b"\xff\xfe").expect("written");
+    assert!(message().contains("UTF-8"));
+    std::fs::write(folder.path().join("panda.urdf"), PANDA_URDF).expect("written");
+    assert_eq!(read(&scene).expect("right").scene, of_folder("panda.toml").scene);
+}
+
+#[test]
+fn notes_of_a_urdf_are_kept() {
+    // The inertia of a rod a thousand times as long as it is said to be: no body has it.
+    let text = with_urdf(&PANDA_URDF.replacen("izz=\"0.009117\"", "izz=\"9.117\"", 1));
+    let file = parse(&text, "inline").unwrap_or_else(|error| panic!("{error}"));
+    assert!(file.scene.urdf_notes.iter().any(|note| note.contains("panda_link1: principal moments")));
+    assert!(file.scene.urdf_notes.iter().any(|note| note.contains("no mass is known of panda_link1")));
+    assert_eq!(file.scene.arm.links[1].inertial, None);
+}
+
+/// Names of the parameters that the arm's structure hides, for full poses and for positions only; and the ranks.
+fn structure(arm: &Arm) -> ([usize; 2], Vec<Vec<String>>) {
+    let subspaces = [true, false].map(|attitude| Subspace::of_structure(arm, attitude));
+    let dropped = subspaces
+        .iter()
+        .map(|subspace| subspace.dropped.iter().map(|column| arm.chain.parameters[*column].name.clone()).collect());
+    (subspaces.each_ref().map(Subspace::rank), dropped.collect())
+}
+
+#[test]
+fn a_chain_from_a_urdf_has_4n_and_6_parameters() {
+    let arm = of_folder("panda.toml").scene.arm;
+    let ([poses, positions], dropped) = structure(&arm);
+    println!("panda: rank {poses}, without {}; positions {positions}, without {}", dropped[0].join(" "), dropped[1].join(" "));
+    // Of a point's position the three angles of the tool are not seen.
+    assert_eq!((poses, positions), (4 * 7 + 6, 4 * 7 + 3));
+    for number in 2..=7 {
+        for hidden in ["z", "yaw"] {
+            assert!(dropped[0].contains(&format!("panda_joint{number}_{hidden}")), "{dropped:?}");
+        }
+    }
+}
+
+#[test]
+fn between_parallel_axes_beta_is_kept_and_d_is_not() {
+    let arm = of_folder("parallel8.toml").scene.arm;
+    let ([poses, positions], dropped) = structure(&arm);
+    println!(
+        "parallel8: rank {poses}, without {}; positions {positions}, without {}",
+        dropped[0].join(" "),
+        dropped[1].join(" ")
+    );
+    // 4·8 + 6 less the two of the base that the first frame of the convention does not have: its theta and d are the joint's.
+    assert_eq!((poses, positions), (36, 33));
+    for dropped in &dropped {
+        // Axes 2, 3 and 4 are parallel, 6 and 7 are.
+        for name in ["beta2", "beta3", "beta6"] {
+            assert!(!dropped.contains(&name.to_owned()), "{name} is dropped: {dropped:?}");
+        }
+        for name in ["d3", "d4", "d7", "beta1", "beta4", "beta5", "beta7", "beta8"] {
+            assert!(dropped.contains(&name.to_owned()), "{name} is kept: {dropped:?}");
+        }
+    }
+}
+
+#[test]
+fn most_configurations_of_the_papers_arms_are_free() {
+    for (name, most) in [("panda.toml", 0.05), ("parallel8.toml", 0.05)] {
+        let arm = of_folder(name).scene.arm;
+        let check = CollisionCheck::new(&arm);
+        let (mut stream, mut scratch) = (stream(14, "test/scene/free"), Scratch::default());
+        let draws = 5000;
+        let mut pairs = std::collections::BTreeMap::<String, usize>::new();
+        let mut refused = 0;
+        for _ in 0..draws {
+            let joints = configuration(&arm, &mut stream);
+            if check.collides(&joints, &mut scratch) {
+                refused += 1;
+                let contact = check.contact(&joints).expect("it collides");
+                *pairs.entry(format!("{} and {}", contact.first, contact.second)).or_default() += 1;
+            }
+        }
+        let share = f64::from(refused) / f64::from(draws);
+        println!("{name}: {share:.4} of random configurations are refused: {pairs:?}");
+        assert!(share > 0.0 && share < most, "{name}: {share}");
+    }
+}
+
+#[test]
+fn a_sensor_sees_its_cone() {
+    let [(arm8, _), _] = shipped();
+    let everywhere = arm8.scene.sensor;
+    assert_eq!(everywhere.view, None);
+    assert!(everywhere.sees(&Vector3::new(1e3, -1e3, 5.0)) && everywhere.sees(&everywhere.position_in_base.coords));
+
+    // From (2.4, 0.7, 0.3) along −x.
+    let with = |view: &str| ARM8.replacen("temperature_noise_k = 0.1", &format!("temperature_noise_k = 0.1\nview = {view}"), 1);
+    let file =
+        parse(&with("{ towards_mm = [0, 700, 300], half_angle_deg = 30 }"), "cone").unwrap_or_else(|error| panic!("{error}"));
+    let sensor = &file.scene.sensor;
+    let edge = 30f64.to_radians().tan();
+    let from = |x: f64, y: f64, z: f64| sensor.sees(&(sensor.position_in_base.coords + Vector3::new(x, y, z)));
+    assert!(from(0.0, 0.0, 0.0) && from(-1.0, 0.0, 0.0) && from(-5.0, 0.0, 0.0));
+    for (y, z) in [(1.0, 0.0), (0.0, -1.0), (0.6, 0.8), (-0.8, 0.6)] {
+        for distance in [0.1, 1.0, 7.0] {
+            let at = |share: f64| from(-distance, share * edge * distance * y, share * edge * distance * z);
+            assert!(at(0.999) && !at(1.001), "{y} {z} {distance}");
+        }
+    }
+    assert!(!from(1.0, 0.0, 0.0) && !from(0.0, 1.0, 0.0));
+    // The same from the public text.
+    let public = file.public_toml().expect("it can be written");
+    assert_eq!(parse(&public, "public").unwrap_or_else(|error| panic!("{error}")).scene, file.scene);
+
+    // Half of space, and all of it.
+    let [half, all] = ["90", "180"].map(|angle| {
+        let text = with(&format!("{{ towards_mm = [0, 700, 300], half_angle_deg = {angle} }}"));
+        parse(&text, "cone").unwrap_or_else(|error| panic!("{error}")).scene.sensor
+    });
+    let behind = half.position_in_base.coords + Vector3::new(1.0, 0.0, 0.0);
+    assert!(half.sees(&Vector3::zeros()) && !half.sees(&behind) && all.sees(&behind));
+
+    let refused: &[(&str, &[&str])] = &[
+        ("{ towards_mm = [2400, 700, 300], half_angle_deg = 20 }", &["sensor.view.towards_mm", "where the sensor stands"]),
+        ("{ towards_mm = [0, 0, 0], half_angle_deg = 0 }", &["sensor.view.half_angle_deg", "more than 0, 180 at most"]),
+        ("{ towards_mm = [0, 0, 0], half_angle_deg = -5 }", &["sensor.view.half_angle_deg", "found: -5"]),
+        ("{ towards_mm = [0, 0, 0], half_angle_deg = 180.5 }", &["sensor.view.half_angle_deg", "180.5"]),
+        ("{ towards_mm = [0, 0, 0] }", &["sensor.view", "`half_angle_deg` is missing"]),
+        ("{ towards_mm = [0, 0], half_angle_deg = 20 }", &["sensor.view.towards_mm", "a list of three numbers"]),
+        ("{ towards_mm = [0, 0, 1e9], half_angle_deg = 20 }", &["sensor.view.towards_mm[3]", "-100000 to 100000"]),
+        ("{ towards_mm = [0, 0, 0], half_angle_rad = 1 }", &["did you mean `half_angle_deg`?"]),
+        ("20", &["sensor.view", "a table"]),
+    ];
+    for (view, expected) in refused {
+        let message = message(&with(view));
+        for fragment in *expected {
+            assert!(message.contains(fragment), "{fragment:?} is not in\n{message}");
+        }
     }
 }

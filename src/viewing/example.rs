@@ -1,4 +1,4 @@
-//! A run that never happened, realistic enough to look at: an arm of eight joints, its swarm, measurements, identification.
+//! A run that never happened, realistic enough to look at: an arm of eight joints, its swarm (or another search), measurements, identification.
 //!
 //! `KINCAL_VIEWING_SAMPLES=folder cargo test --release viewing::example -- --ignored` writes recordings to look at.
 
@@ -8,14 +8,16 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::{Target, Viewer, ViewerError, open};
 use crate::arm::{Arm, Fixture, Geometry, Inertial, Link, Shape};
-use crate::design::outcome::{DesignOutcome, EvennessDomains, RandomReference, StopReason, SwarmIteration};
+use crate::design::outcome::{Advice, DesignOutcome, EvennessDomains, RandomReference, SearchStep, StopReason, SwarmIteration};
 use crate::frames::{Pose, pose_error, rotation_from_vector};
 use crate::identification::outcome::{DeclaredNoise, Errors, Identification, ParameterEstimate, Residual, Summary};
 use crate::kinematics::mdh::{Frame, chain};
 use crate::kinematics::{Joint, JointKind, Quantity};
 use crate::measurement::{Measurement, Role};
 use crate::quality::Indexes;
+use crate::quality::prediction::Prediction;
 use crate::recording::event::{Event, Listener, Start};
+use crate::scene::{Criterion, DesignProblem, Method};
 use crate::seed::stream;
 
 const JOINTS: usize = 8;
@@ -157,6 +159,9 @@ fn events(particles: usize, count: usize, iterations: usize, held_out: usize) ->
     }
     events.push(Event::Designed(DesignOutcome {
         method: "pso".to_owned(),
+        criterion: "comprehensive".to_owned(),
+        value: indexes(1.0).comprehensive,
+        advice: None,
         configurations: goal.clone(),
         indexes: indexes(1.0),
         indexes_all_parameters: indexes(1.0),
@@ -256,8 +261,68 @@ fn summary(values: impl Iterator<Item = f64> + Clone) -> Summary {
     }
 }
 
+/// The events of a run with a search of `steps` steps in place of the swarm.
+fn searched(count: usize, steps: usize, held_out: usize) -> (Arm, Vec<Event>) {
+    let (arm, mut events) = events(4, count, 2, held_out);
+    events.retain(|event| !matches!(event, Event::Swarm(_)));
+    events[1] = Event::Note("design by coordinate exchange, seed 1".to_owned());
+    let prediction = |position_rms_m: f64| Prediction {
+        position_rms_m,
+        attitude_rms_rad: 0.3 * position_rms_m,
+        position_worst_m: 1.6 * position_rms_m,
+    };
+    let mut configurations = Vec::new();
+    for event in &mut events {
+        if let Event::Designed(design) = event {
+            design.method = "coordinate_exchange".to_owned();
+            design.criterion = "i_optimality".to_owned();
+            design.value = -2.0 * libm::log(52e-6);
+            design.stop = StopReason::BudgetSpent;
+            design.advice = Some(Advice {
+                chosen: Some(prediction(52e-6)),
+                random: Some(prediction(66e-6)),
+                random_range_m: [60e-6, 75e-6],
+                random_undetermined: 0,
+                bound_m: 49e-6,
+                bound_gap: 1e-3,
+                bound_candidates: 1000,
+            });
+            configurations.clone_from(&design.configurations);
+        }
+    }
+    let told = (0..steps).map(|step| {
+        let error = |progress: f64| (52.0 + 14.0 * libm::exp(-4.0 * progress)) * 1e-6;
+        let progress = step as f64 / steps as f64;
+        Event::Search(SearchStep {
+            step,
+            evaluations: 1 + 500 * step as u64,
+            budget: 500 * steps as u64,
+            rejections: 31 * step as u64,
+            // The first set determines nothing.
+            value: if step == 0 { f64::MIN } else { -2.0 * libm::log(error(progress - 0.1 * libm::sin(step as f64).abs())) },
+            best: if step == 0 { f64::MIN } else { -2.0 * libm::log(error(progress)) },
+            best_configurations: if step % 3 == 1 { Vec::new() } else { configurations.clone() },
+        })
+    });
+    let told: Vec<Event> = told.collect();
+    events.splice(2..2, told);
+    (arm, events)
+}
+
+/// The problem of a run, as far as it is shown.
+fn problem(events: &[Event]) -> DesignProblem {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml");
+    let mut problem = crate::scene::read(&path).unwrap().scene.design;
+    let searched = events.iter().any(|event| matches!(event, Event::Search(_)));
+    (problem.method, problem.criterion) = match searched {
+        true => (Method::CoordinateExchange, Criterion::IOptimality),
+        false => (Method::Pso, Criterion::Comprehensive),
+    };
+    problem
+}
+
 fn write(path: &Path, arm: &Arm, events: &[Event]) {
-    let mut viewer = open(&Target::File(path.to_owned()), arm, "example").unwrap().unwrap();
+    let mut viewer = open(&Target::File(path.to_owned()), arm, Some(&problem(events)), "example").unwrap().unwrap();
     for event in events {
         viewer.take(event).unwrap();
     }
@@ -276,8 +341,25 @@ fn a_run_is_written_to_a_file() {
 }
 
 #[test]
+fn a_search_is_written_to_a_file_and_nothing_of_a_swarm() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("search.rrd");
+    let (arm, events) = searched(40, 30, 20);
+    write(&path, &arm, &events);
+    let bytes = std::fs::read(&path).unwrap();
+    let holds = |text: &str| bytes.windows(text.len()).any(|window| window == text.as_bytes());
+    assert!(bytes.len() > 100_000 && holds("/search/criterion/best") && holds("/search/effort"), "{} bytes", bytes.len());
+    assert!(!holds("/swarm/"), "panels of a swarm that there is not");
+    let (arm, events) = super::example::events(4, 10, 5, 5);
+    write(&path, &arm, &events);
+    let bytes = std::fs::read(&path).unwrap();
+    let holds = |text: &str| bytes.windows(text.len()).any(|window| window == text.as_bytes());
+    assert!(holds("/swarm/fitness/best") && !holds("/search/"), "panels of a search that there is not");
+}
+
+#[test]
 fn a_file_that_cannot_be_written_is_an_error_with_its_name() {
-    let error = open(&Target::File(PathBuf::from("/proc/no/folder/run.rrd")), &arm(), "example").unwrap_err();
+    let error = open(&Target::File(PathBuf::from("/proc/no/folder/run.rrd")), &arm(), None, "example").unwrap_err();
     assert!(matches!(&error, ViewerError::Create { .. }), "{error:?}");
     assert_eq!(error.to_string(), "/proc/no/folder/run.rrd cannot be written: No such file or directory (os error 2)");
 }
@@ -286,12 +368,13 @@ fn a_file_that_cannot_be_written_is_an_error_with_its_name() {
 fn a_viewer_that_is_not_there_is_an_error_and_an_address_that_is_none_too() {
     // A port that was free a moment ago.
     let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-    let connect = |url: String| open(&Target::Connect(Some(url)), &arm(), "example").map(|_: Option<Viewer>| ()).unwrap_err();
+    let connect =
+        |url: String| open(&Target::Connect(Some(url)), &arm(), None, "example").map(|_: Option<Viewer>| ()).unwrap_err();
     let error = connect(format!("127.0.0.1:{port}"));
     assert!(matches!(&error, ViewerError::Absent { .. }), "{error:?}");
     assert!(error.to_string().contains("start one"), "{error}");
     assert!(matches!(connect("http://".to_owned()), ViewerError::Url { .. }));
-    assert!(open(&Target::Off, &arm(), "example").unwrap().is_none());
+    assert!(open(&Target::Off, &arm(), None, "example").unwrap().is_none());
 }
 
 #[test]
@@ -301,7 +384,7 @@ fn a_viewer_that_takes_nothing_holds_up_no_run() {
     let url = silent.local_addr().unwrap().to_string();
     let (arm, events) = events(20, 40, 200, 20);
     let since = std::time::Instant::now();
-    let mut viewer = open(&Target::Connect(Some(url)), &arm, "example").unwrap().unwrap();
+    let mut viewer = open(&Target::Connect(Some(url)), &arm, Some(&problem(&events)), "example").unwrap().unwrap();
     for event in &events {
         viewer.take(event).unwrap();
     }
@@ -315,7 +398,8 @@ fn a_viewer_that_takes_nothing_holds_up_no_run() {
 fn live() {
     let target: Target = std::env::var("KINCAL_VIEWING_TARGET").unwrap().parse().unwrap();
     let (arm, events) = events(20, 40, 30, 20);
-    let Some(mut viewer) = open(&target, &arm, "example").unwrap_or_else(|error| panic!("{error}")) else {
+    let Some(mut viewer) = open(&target, &arm, Some(&problem(&events)), "example").unwrap_or_else(|error| panic!("{error}"))
+    else {
         eprintln!("nobody looks");
         return;
     };
@@ -342,6 +426,8 @@ fn samples() {
     write(&folder.join("run.rrd"), &arm, &run);
     write(&folder.join("half-swarm.rrd"), &arm, &run[..18]);
     write(&folder.join("half-measured.rrd"), &arm, &run[..64]);
+    let (search_arm, search) = searched(40, 30, 20);
+    write(&folder.join("search.rrd"), &search_arm, &search);
     let part = |command: &str, keep: fn(&Event) -> bool| -> Vec<Event> {
         let start =
             Start { version: "0.1.0".to_owned(), command: command.to_owned(), scene: String::new(), poses: None, real: None };

@@ -18,20 +18,39 @@ use rerun::external::re_sdk_types::datatypes::{Float32, Float64, Range1D, Range2
 use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
 
 use super::{chart, picture};
+use crate::report::criterion::Words;
+use crate::scene::Method;
 
 const BACKGROUND: [u8; 3] = [20, 22, 28];
+
+/// What there is to see of the choosing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Choosing {
+    /// It is not done.
+    Not,
+    /// The paper's swarm.
+    Swarm(Words),
+    /// Any other method.
+    Search(Words),
+}
 
 /// Which parts of a run there are to see.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Parts {
-    pub(super) swarm: bool,
+    pub(super) choosing: Choosing,
     pub(super) measured: bool,
 }
 
 impl Parts {
     /// What the run of a command shows; all of it for a command that is not known here.
-    pub(super) fn of(command: &str) -> Parts {
-        Parts { swarm: !matches!(command, "measure" | "identify"), measured: command != "design" }
+    pub(super) fn of(command: &str, design: Option<(Method, Words)>) -> Parts {
+        let choosing = match design {
+            _ if matches!(command, "measure" | "identify") => Choosing::Not,
+            None => Choosing::Not,
+            Some((Method::Pso, words)) => Choosing::Swarm(words),
+            Some((_, words)) => Choosing::Search(words),
+        };
+        Parts { choosing, measured: command != "design" }
     }
 }
 
@@ -134,7 +153,11 @@ fn scene(name: &str, contents: &[&'static str], camera: Camera) -> Node {
 }
 
 fn plot(name: &str, contents: &[&'static str], legend: bool) -> Node {
-    let legend = PlotLegend::new().with_visible(legend).with_corner(Corner2D::RightBottom);
+    legend_at(Corner2D::RightBottom, name, contents, legend)
+}
+
+fn legend_at(corner: Corner2D, name: &str, contents: &[&'static str], legend: bool) -> Node {
+    let legend = PlotLegend::new().with_visible(legend).with_corner(corner);
     view("TimeSeries", name, contents).with("PlotLegend", legend)
 }
 
@@ -167,34 +190,50 @@ fn tree(parts: Parts, camera: Camera) -> Node {
         )
     };
     let indexes = || plot("Indexes of the best set: O_C and its parts as 2/π·atan", &["/swarm/indexes/**"], true);
-    let fitness = || {
+    let effort = |path| plot("Evaluations, rejections", &[path], true);
+    let fitness = |words: Words| {
+        let name = format!("{}: swarm's best (amber), particles", capital(words.quantity()));
         tabs(vec![
-            plot("Fitness O_C: swarm's best (amber), particles", &["/swarm/fitness/**"], false),
-            plot("Evaluations, rejections", &["/swarm/effort/**"], true),
+            plot(&name, &["/swarm/fitness/**"], false),
+            effort("/swarm/effort/**"),
             plot("ω, c1, c2", &["/swarm/coefficients/**"], true),
         ])
     };
+    let search =
+        |words: Words| tabs(vec![plot(&capital(words.quantity()), &["/search/criterion/**"], true), effort("/search/effort/**")]);
     let position = error_chart("Position error", "/errors/position/**");
     let attitude = error_chart("Attitude error", "/errors/attitude/**");
     let temperatures = plot("Temperatures, °C", &["/temperatures/**"], true);
     let side = tabs(vec![summary, notes]);
-    match (parts.swarm, parts.measured) {
-        (true, false) => columns(vec![
+    match (parts.choosing, parts.measured) {
+        (Choosing::Swarm(words), false) => columns(vec![
             (4.0, rows(vec![(3.0, cell), (2.0, indexes())])),
-            (3.0, rows(vec![(3.0, swarm()), (2.0, fitness())])),
+            (3.0, rows(vec![(3.0, swarm()), (2.0, fitness(words))])),
             (3.0, side),
         ]),
-        (true, true) => columns(vec![
-            (4.0, rows(vec![(10.0, cell), (5.0, indexes()), (4.0, fitness())])),
+        (Choosing::Swarm(words), true) => columns(vec![
+            (4.0, rows(vec![(10.0, cell), (5.0, indexes()), (4.0, fitness(words))])),
             (4.0, rows(vec![(1.0, residuals()), (1.0, swarm())])),
             (3.0, rows(vec![(2.0, side), (1.0, tabs(vec![position, attitude, temperatures]))])),
         ]),
-        (false, _) => {
+        (Choosing::Search(words), false) => columns(vec![(2.0, rows(vec![(3.0, cell), (2.0, search(words))])), (1.0, side)]),
+        (Choosing::Search(words), true) => columns(vec![
+            (4.0, rows(vec![(10.0, cell), (6.0, search(words))])),
+            (4.0, rows(vec![(10.0, residuals()), (6.0, tabs(vec![position, attitude]))])),
+            (3.0, rows(vec![(2.0, side), (1.0, temperatures)])),
+        ]),
+        (Choosing::Not, _) => {
             let scenes = columns(vec![(1.0, cell), (1.0, residuals())]);
             let charts = columns(vec![(1.0, position), (1.0, attitude)]);
             columns(vec![(8.0, rows(vec![(5.0, scenes), (3.0, charts)])), (3.0, rows(vec![(2.0, side), (1.0, temperatures)]))])
         }
     }
+}
+
+/// A title begins with a capital letter.
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }
 
 /// Sends the blueprint of a run and makes it the active one.

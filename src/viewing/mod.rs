@@ -1,4 +1,4 @@
-//! Live view of a run in Rerun: the swarm, the arm in its configurations, measured against predicted poses, residuals.
+//! Live view of a run in Rerun: the swarm or another search, the arm in its configurations, measured against predicted poses, residuals.
 //!
 //! A [`Viewer`] is one more listener of a run's events: it sees what is recorded and nothing else, so that a replay shows what
 //! the run showed. [`open`] finds out where to ([`Target`]); a thread of its own does the logging, so that a viewer that hangs

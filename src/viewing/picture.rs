@@ -1,6 +1,7 @@
 //! What each event draws.
 //!
-//! Timelines: `event` counts everything and is the one the view opens on; `iteration` holds the swarm, `pose` (index of the
+//! Timelines: `event` counts everything and is the one the view opens on; `iteration` holds the swarm, `evaluations` (of the
+//! criterion) any other search, `pose` (index of the
 //! measurement) and `time` (of the session) the measuring. Clock times are not recorded.
 
 use std::collections::BTreeMap;
@@ -10,28 +11,31 @@ use rerun::log::ChunkBatcherConfig;
 use rerun::sink::LogSink;
 use rerun::{
     Arrows3D, LineStrips3D, Points3D, Radius, RecordingStream, RecordingStreamBuilder, RecordingStreamResult, Scalars,
-    SeriesLines, TextDocument, TextLog, TextLogLevel, TransformAxes3D,
+    SeriesLines, SeriesPoints, TextDocument, TextLog, TextLogLevel, TransformAxes3D,
 };
 use sha2::{Digest, Sha256};
 
 use super::body::{Body, point, transform};
 use super::chart::{self, Series, Unit};
-use super::layout::{self, Camera, Parts};
+use super::layout::{self, Camera, Choosing, Parts};
 use super::summary::{Summary, significant};
 use super::viewer::ViewerError;
 use crate::arm::Arm;
-use crate::design::outcome::{DesignOutcome, SwarmIteration};
+use crate::design::outcome::{DesignOutcome, SearchStep, SwarmIteration};
 use crate::frames::{Pose, pose_error};
 use crate::identification::outcome::{Identification, Residual};
 use crate::measurement::{Measurement, Role};
 use crate::quality::Indexes;
 use crate::recording::event::{Event, Start};
+use crate::report::criterion::Words;
+use crate::scene::{DesignProblem, Method};
 
 /// The application in the viewer, which keeps one layout for each.
 pub(super) const APPLICATION: &str = "kincal";
 /// The timeline of all events.
 pub(super) const EVENTS: &str = "event";
 const ITERATIONS: &str = "iteration";
+const EVALUATIONS: &str = "evaluations";
 const POSES: &str = "pose";
 const TIME: &str = "time";
 
@@ -57,6 +61,8 @@ const LINES: usize = 60;
 pub(super) struct Picture {
     body: Body,
     name: String,
+    /// Method of the design, and how its criterion is told.
+    design: Option<(Method, Words)>,
     event: i64,
     best: Vec<Vec<f64>>,
     summary: Summary,
@@ -73,10 +79,11 @@ pub(super) struct Picture {
 type Vector = fn(&Residual) -> &[f64; 6];
 
 impl Picture {
-    pub(super) fn new(arm: &Arm, name: &str) -> Result<Picture, ViewerError> {
+    pub(super) fn new(arm: &Arm, design: Option<&DesignProblem>, name: &str) -> Result<Picture, ViewerError> {
         Ok(Picture {
             body: Body::new(arm)?,
             name: name.to_owned(),
+            design: design.map(|design| (design.method, Words::new(Some(design.criterion)))),
             event: 0,
             best: Vec::new(),
             summary: Summary::default(),
@@ -108,8 +115,13 @@ impl Picture {
         stream.set_log_time_enabled(false);
         stream.set_log_tick_enabled(false);
         stream.send_recording_name(self.name.as_str())?;
-        layout::send(&stream, APPLICATION, Parts::of(command), self.camera())?;
+        let parts = Parts::of(command, self.design);
+        layout::send(&stream, APPLICATION, parts, self.camera())?;
         stream.set_time_sequence(EVENTS, 0);
+        if matches!(parts.choosing, Choosing::Search(_)) {
+            // What stands still is there on the search's own timeline too.
+            stream.set_time_sequence(EVALUATIONS, 0);
+        }
         self.body.log_shapes(&stream)?;
         self.log_scales(&stream, &["nothing is measured yet".to_owned()])?;
         for path in ["errors/position", "errors/attitude"] {
@@ -155,6 +167,7 @@ impl Picture {
         match event {
             Event::Start(start) => self.summary.start(&self.name, &self.body.arm().name, start),
             Event::Swarm(swarm) => self.swarm(stream, swarm)?,
+            Event::Search(step) => self.search(stream, step)?,
             Event::Designed(design) => self.designed(stream, design)?,
             Event::Measured(measurement) => self.measured(stream, measurement)?,
             Event::Identified(identified) => self.identified(stream, identified)?,
@@ -171,6 +184,11 @@ impl Picture {
     fn end_points(&self, configurations: &[Vec<f64>], share: f64) -> Points3D {
         let tools = configurations.iter().filter_map(|joints| self.body.tool(joints));
         Points3D::new(tools.map(|tool| point(&tool.translation.vector))).with_colors([AMBER]).with_radii([self.size(share)])
+    }
+
+    /// How values of the criterion are told.
+    fn words(&self) -> Words {
+        self.design.map_or(Words::new(None), |(_, words)| words)
     }
 
     fn swarm(&mut self, stream: &RecordingStream, swarm: &SwarmIteration) -> RecordingStreamResult<()> {
@@ -199,13 +217,42 @@ impl Picture {
         let particles = Points3D::new(points).with_colors(point_colours).with_radii([self.size(0.004)]);
         stream.log("world/swarm/particles", &particles)?;
 
-        stream.log("swarm/fitness/particles", &Scalars::new(swarm.fitness.iter().copied()))?;
-        stream.log("swarm/fitness/personal_best", &Scalars::new(swarm.personal_best.iter().copied()))?;
-        stream.log("swarm/fitness/best", &Scalars::new([swarm.best.comprehensive]))?;
+        let words = self.words();
+        let scaled = |values: &[f64]| Scalars::new(values.iter().map(|value| words.scaled(*value)).collect::<Vec<_>>());
+        stream.log("swarm/fitness/particles", &scaled(&swarm.fitness))?;
+        stream.log("swarm/fitness/personal_best", &scaled(&swarm.personal_best))?;
+        stream.log("swarm/fitness/best", &Scalars::new(swarm.best_value().map(|best| words.scaled(best))))?;
         stream.log("swarm/indexes", &Scalars::new(normalised(&swarm.best)))?;
         stream.log("swarm/effort", &Scalars::new([swarm.evaluations as f64, swarm.rejections as f64]))?;
         stream.log("swarm/coefficients", &Scalars::new([swarm.inertia, swarm.c1, swarm.c2]))?;
-        self.summary.swarm(swarm);
+        self.summary.swarm(swarm, words);
+        Ok(())
+    }
+
+    fn search(&mut self, stream: &RecordingStream, step: &SearchStep) -> RecordingStreamResult<()> {
+        stream.set_time_sequence(EVALUATIONS, i64::try_from(step.evaluations).unwrap_or(i64::MAX));
+        if !self.series_named {
+            self.series_named = true;
+            name_search(stream)?;
+        }
+        if !step.best_configurations.is_empty() {
+            self.best.clone_from(&step.best_configurations);
+            stream.log("world/design/end_points", &self.end_points(&self.best, 0.006))?;
+        }
+        if !self.best.is_empty() {
+            // As with the swarm: playing the search moves the arm through the best set.
+            self.body.log_configuration(stream, &self.best[step.step % self.best.len()])?;
+        }
+        let words = self.words();
+        for (path, value) in [("search/criterion/best", step.best), ("search/criterion/current", step.value)] {
+            // A set that determines nothing has no place in the chart.
+            let scaled = words.scaled(value);
+            if scaled.is_finite() && value > f64::MIN {
+                stream.log(path, &Scalars::new([scaled]))?;
+            }
+        }
+        stream.log("search/effort", &Scalars::new([step.evaluations as f64, step.rejections as f64]))?;
+        self.summary.search(step, self.design.map_or("search", |(method, _)| method.name()), words);
         Ok(())
     }
 
@@ -439,6 +486,19 @@ fn particle_colours(fitness: &[f64]) -> Vec<[u8; 3]> {
             std::array::from_fn(|k| (f64::from(POOR[k]) + share * (f64::from(GOOD[k]) - f64::from(POOR[k]))) as u8)
         })
         .collect()
+}
+
+/// Names and colours of a search's curves, at all times. Steps may be few: each is a point on its curve.
+fn name_search(stream: &RecordingStream) -> RecordingStreamResult<()> {
+    for (path, name, colour, width) in
+        [("search/criterion/best", "best", AMBER, 3.0), ("search/criterion/current", "current", CURVES[1], 1.5)]
+    {
+        stream.log_static(path, &SeriesLines::new().with_names([name]).with_colors([colour]).with_widths([width]))?;
+        let points = SeriesPoints::new().with_names([name]).with_colors([colour]).with_marker_sizes([width]);
+        stream.log_static(path, &points)?;
+    }
+    let effort = SeriesLines::new().with_names(["evaluations", "rejections"]);
+    stream.log_static("search/effort", &effort.with_colors(CURVES[..2].iter().copied()))
 }
 
 /// Names, colours and widths of the curves, at all times.

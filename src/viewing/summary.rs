@@ -2,17 +2,18 @@
 
 use std::fmt::Write as _;
 
-use crate::design::outcome::{DesignOutcome, StopReason, SwarmIteration};
+use crate::design::outcome::{Advice, DesignOutcome, SearchStep, StopReason, SwarmIteration};
 use crate::identification::outcome::{Errors, Identification};
 use crate::measurement::{Measurement, Role};
 use crate::quality::Indexes;
 use crate::recording::event::Start;
+use crate::report::criterion::Words;
 
 /// What is known of the run so far, newest section first.
 #[derive(Debug, Default)]
 pub(super) struct Summary {
     head: String,
-    swarm: String,
+    choosing: String,
     design: String,
     measured: [usize; 2],
     session_s: f64,
@@ -24,36 +25,55 @@ impl Summary {
         self.head = format!("### {name}: {}\narm {arm}, kincal {}\n\n", start.command, start.version);
     }
 
-    pub(super) fn swarm(&mut self, swarm: &SwarmIteration) {
-        self.swarm = format!(
-            "#### Swarm\niteration {} of {}: O_C = {} after {} evaluations, {} rejections\n\n",
+    pub(super) fn swarm(&mut self, swarm: &SwarmIteration, words: Words) {
+        self.choosing = format!(
+            "#### Swarm\non `{}`, iteration {} of {}: {} after {} evaluations, {} rejections\n\n",
+            words.name(),
             swarm.iteration,
             swarm.iterations,
-            significant(swarm.best.comprehensive, 5),
+            swarm.best_value().map(|best| words.value(best)).unwrap_or_default(),
             swarm.evaluations,
             swarm.rejections
         );
     }
 
+    /// `method` as in the scene.
+    pub(super) fn search(&mut self, step: &SearchStep, method: &str, words: Words) {
+        self.choosing = format!(
+            "#### Search\n`{method}` on `{}`: step {}, {} of {} evaluations, {} rejections; best: **{}**\n\n",
+            words.name(),
+            step.step,
+            step.evaluations,
+            step.budget,
+            step.rejections,
+            words.value(step.best)
+        );
+    }
+
     pub(super) fn designed(&mut self, design: &DesignOutcome) {
-        self.swarm.clear();
+        self.choosing.clear();
         let stop = match design.stop {
             StopReason::IterationLimit => "all iterations made",
             StopReason::Converged => "converged",
             StopReason::Drawn => "drawn",
+            StopReason::BudgetSpent => "budget spent",
+            StopReason::LocalOptimum => "no change makes it better",
         };
         let mut text = format!(
-            "#### Design\n{} configurations by `{}`: {stop}, {} evaluations, {} rejections; rank {}.\n\n\
-             | index | chosen | random, mean | random, range |\n|---|---|---|---|\n",
+            "#### Design\n{} configurations by `{}` on `{}`: **{}**; {stop}, {} evaluations, {} rejections; rank {}.\n\n\
+             {}| index | chosen | random, mean | random, range |\n|---|---|---|---|\n",
             design.configurations.len(),
             design.method,
+            design.criterion,
+            Words::of(&design.criterion).value(design.value),
             design.evaluations,
             design.rejections,
             design.indexes.rank,
+            design.advice.as_ref().map(predicted).unwrap_or_default(),
         );
         type Of = fn(&Indexes) -> f64;
         let rows: [(&str, Of); 9] = [
-            ("**O_C**", |i| i.comprehensive),
+            ("O_C", |i| i.comprehensive),
             ("O1", |i| i.o1),
             ("O2", |i| i.o2),
             ("O3", |i| i.o3),
@@ -115,8 +135,16 @@ impl Summary {
         } else {
             format!("#### Measured\n{fit} to fit, {held_out} held out; {} min.\n\n", significant(self.session_s / 60.0, 3))
         };
-        [&self.head, &self.identified, &measured, &self.swarm, &self.design].into_iter().map(String::as_str).collect()
+        [&self.head, &self.identified, &measured, &self.choosing, &self.design].into_iter().map(String::as_str).collect()
     }
+}
+
+/// What noise alone will leave: by random sets, by the chosen one, and at least.
+fn predicted(advice: &Advice) -> String {
+    let mm = |error_m: Option<f64>| error_m.map_or("–".to_owned(), |error_m| format!("{} mm", significant(error_m * 1e3, 3)));
+    let [random, chosen] = [advice.random, advice.chosen].map(|prediction| mm(prediction.map(|p| p.position_rms_m)));
+    let bound = mm(Some(advice.bound_m));
+    format!("Noise will leave an error of {chosen} RMS over the workspace; random sets {random}, no set less than {bound}.\n\n")
 }
 
 /// Errors before and after, on held-out configurations first where there are any; the first of them in a sentence.
@@ -160,6 +188,24 @@ pub(super) fn significant(value: f64, digits: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_search_is_told_by_its_method_and_in_the_words_of_its_criterion() {
+        let step = SearchStep {
+            step: 3,
+            evaluations: 7680,
+            budget: 20_000,
+            rejections: 5,
+            value: 18.0,
+            best: -2.0 * libm::log(0.052e-3),
+            best_configurations: Vec::new(),
+        };
+        let mut summary = Summary::default();
+        summary.search(&step, "coordinate_exchange", Words::of("i_optimality"));
+        let expected = "`coordinate_exchange` on `i_optimality`: step 3, 7680 of 20000 evaluations, 5 rejections; best: \
+                        **predicted 0.0520 mm**";
+        assert!(summary.markdown().contains(expected), "{}", summary.markdown());
+    }
 
     #[test]
     fn numbers_keep_their_significant_digits() {

@@ -12,6 +12,7 @@ use super::picture::Picture;
 use super::target::Target;
 use crate::arm::Arm;
 use crate::recording::event::{Event, Listener, ListenerError};
+use crate::scene::DesignProblem;
 
 /// How long a viewer is looked for where nobody asked for one.
 const PROBE: Duration = Duration::from_millis(100);
@@ -132,13 +133,13 @@ pub struct Viewer {
 
 /// Opens the place where a run of `arm` is shown: `None` where it is not to be shown, or where nobody looks.
 ///
-/// `arm` is the nominal arm; `name` is the recording's name in the viewer. Runs of one name, arm, scene and command have one
+/// `arm` is the nominal arm; `design` the problem that is solved in the run, which names its method and criterion; `name` is the recording's name in the viewer. Runs of one name, arm, scene and command have one
 /// recording id.
 ///
 /// # Errors
 /// If the viewer that was asked for is not there, or the file cannot be written. [`Target::Auto`] and [`Target::Off`] fail only
 /// for an arm that cannot be drawn.
-pub fn open(target: &Target, arm: &Arm, name: &str) -> Result<Option<Viewer>, ViewerError> {
+pub fn open(target: &Target, arm: &Arm, design: Option<&DesignProblem>, name: &str) -> Result<Option<Viewer>, ViewerError> {
     let (destination, sink): (Destination, Box<dyn LogSink>) = match target {
         Target::Off => return Ok(None),
         Target::Auto => {
@@ -169,7 +170,7 @@ pub fn open(target: &Target, arm: &Arm, name: &str) -> Result<Option<Viewer>, Vi
             (Destination::File(path.clone()), Box::new(sink))
         }
     };
-    Viewer::start(destination, sink, arm, name).map(Some)
+    Viewer::start(destination, sink, Picture::new(arm, design, name)?).map(Some)
 }
 
 fn listens(address: &SocketAddr, timeout: Duration) -> bool {
@@ -241,8 +242,7 @@ fn innermost(error: &dyn std::error::Error) -> String {
 }
 
 impl Viewer {
-    fn start(destination: Destination, sink: Box<dyn LogSink>, arm: &Arm, name: &str) -> Result<Viewer, ViewerError> {
-        let picture = Picture::new(arm, name)?;
+    fn start(destination: Destination, sink: Box<dyn LogSink>, picture: Picture) -> Result<Viewer, ViewerError> {
         let (events, queue) = sync_channel(QUEUE);
         let (done, result) = channel();
         let to = destination.clone();

@@ -6,6 +6,10 @@ use std::path::Path;
 use crate::harness::{Run, kincal, names, quick_run};
 
 const SCENE: &str = include_str!("../../scenes/arm8.toml");
+/// Every method and every criterion, as an error names them.
+const METHODS: &str =
+    "pso, improved_pso, detmax, annealing, genetic, genetic_repeated, perturbation, coordinate_exchange, best_of_random, random";
+const CRITERIA: &str = "comprehensive, o1, o2, o3, o4, o5, o6, dispersion, evenness, d_optimality, i_optimality, g_optimality";
 
 /// Runs `kincal` with `arguments` into a folder of its own, which must stay empty.
 #[track_caller]
@@ -99,7 +103,12 @@ fn overrides_that_are_wrong() {
         ("arm.frame[0].a_mm=1", "arm.frame[0].a_mm"),
         ("design.count=", "a whole number"),
         ("design.count=many", "a whole number"),
-        ("design.method=ga", "pso, random"),
+        ("design.method=ga", METHODS),
+        ("design.method=coordinate-exchange", "did you mean `coordinate_exchange`?"),
+        ("design.criterion=oc", CRITERIA),
+        ("design.criterion=i_optimalty", "did you mean `i_optimality`?"),
+        ("design.budget=0", "design.budget"),
+        ("design.pool=many", "a whole number"),
         ("design.count=\"40\"", "a whole number"),
         ("design.count=40.5", "a whole number"),
         ("design.count=7", "8 or more"),

@@ -22,6 +22,56 @@ fn a_recording_replays_bit_for_bit_with_and_without_its_truth() {
     assert_eq!(crate::harness::names(&run.path("replayed")), Vec::<String>::new());
 }
 
+/// Whatever chooses, the number of threads changes no byte, every step is recorded, and the recording replays.
+#[test]
+fn every_method_is_recorded_and_replays_bit_for_bit() {
+    for method in kincal::scene::Method::ALL.map(kincal::scene::Method::name) {
+        let assignment = format!("design.method={method}");
+        let set = [&assignment, "design.budget=300", "design.pool=60", "design.count=8", "plan.held_out_count=5"];
+        let set: Vec<&str> = set.into_iter().flat_map(|assignment| ["--set", assignment]).collect();
+        let [one, two] = ["1", "2"].map(|threads| quick_run(&[&set[..], &["--threads", threads]].concat()));
+        for name in ["arm8.mcap", "arm8.truth.toml"] {
+            let [one, two] = [&one, &two].map(|run| fs::read(run.path(name)).unwrap());
+            assert!(one == two, "{method}: {name} differs between one thread and two");
+        }
+        let messages = crate::harness::messages(&one.path("arm8.mcap"));
+        let count = |topic: &str| messages.iter().filter(|(at, _)| at == topic).count();
+        let steps = if method == "pso" { ["/design/swarm", "/design/search"] } else { ["/design/search", "/design/swarm"] };
+        assert!(count(steps[0]) > 0 && count(steps[1]) == 0, "{method}");
+        assert!(count("/design/best/end_points") > 1, "{method}: the start's and one with points");
+        // The last step told the set that is measured.
+        let last = messages.iter().rfind(|(topic, _)| topic == steps[0]).unwrap();
+        let last: serde_json::Value = serde_json::from_slice(&last.1).unwrap();
+        let design = &one.json["design"];
+        if method != "pso" {
+            assert_eq!(last["best"], design["value"], "{method}");
+            assert!(last["evaluations"].as_u64() <= design["evaluations"].as_u64(), "{method}");
+        }
+        assert_eq!((&design["method"], &design["criterion"]), (&method.into(), &"comprehensive".into()));
+        for more in [&[][..], &["--truth", &one.text("arm8.truth.toml"), "--threads", "1"]] {
+            let json = replay(&one, "arm8.mcap", &[more, &["--json"]].concat()).ends(0).json();
+            assert_eq!((&json["identical"], &json["messages_compared"]), (&true.into(), &messages.len().into()), "{method}");
+        }
+    }
+}
+
+#[test]
+fn a_changed_step_of_a_search_is_found_and_a_cut_one_is_compared_up_to_the_cut() {
+    let set = ["design.method=detmax", "design.criterion=i_optimality", "design.budget=3000", "design.pool=60"];
+    let set: Vec<&str> = set.into_iter().flat_map(|assignment| ["--set", assignment]).collect();
+    let run = quick_run(&set);
+    let changed = run.path("changed.mcap");
+    rewrite_text(&run.path("arm8.mcap"), &changed, "/design/search", 1, |text| next_up(text, "/best_configurations/3/joints/2"));
+    let ran = replay(&run, "changed.mcap", &[]).ends(1);
+    assert!(ran.stdout.starts_with("different: /design/search[1].best_configurations[3].joints[2]: recorded "), "{}", ran.stdout);
+    let bytes = fs::read(run.path("arm8.mcap")).unwrap();
+    for share in [5, 3, 2] {
+        fs::write(run.path("cut.mcap"), &bytes[..bytes.len() / share]).unwrap();
+        let json = replay(&run, "cut.mcap", &["--json"]).ends(2).json();
+        assert!(json["first_difference"].is_null() && json["messages_compared"].as_u64().unwrap() > 0, "{json}");
+    }
+}
+
 #[test]
 fn a_truth_file_of_another_run_is_refused() {
     let (run, other) = (quick_run(&[]), quick_run(&["--seed", "7"]));

@@ -44,6 +44,7 @@ fn sensor(sigma: [f64; 2], attitude: bool) -> Sensor {
         position_sigma_per_m: 0.0,
         attitude_sigma_rad: attitude.then_some(sigma[1]),
         temperature_sigma_k: None,
+        view: None,
     }
 }
 

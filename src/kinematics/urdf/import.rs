@@ -482,7 +482,7 @@ impl<'a> Build<'a> {
                     .map(|shape| Shape { link_from_shape: link_from_body * shape.link_from_shape, geometry: shape.geometry }),
             );
             if let Some(inertial) = self.inertial(body)? {
-                masses.push(moved(&inertial, link_from_body));
+                masses.push(inertial.moved(link_from_body));
             }
         }
         let inertial = sum(&masses);
@@ -514,7 +514,7 @@ impl<'a> Build<'a> {
         let inertia_in_body = Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz);
         let at_centre =
             Inertial { mass_kg: mass.value, centre_of_mass_in_link: Point3::origin(), inertia_in_link: inertia_in_body };
-        Ok(Some(moved(&at_centre, &pose(origin))))
+        Ok(Some(at_centre.moved(&pose(origin))))
     }
 
     /// Shapes in the URDF link's frame: its collision elements, or if it has none, what is drawn.
@@ -562,16 +562,6 @@ impl<'a> Build<'a> {
 
 fn pose(origin: &urdf_rs::Pose) -> Pose {
     Pose::from_parts(Translation3::from(Vector3::from(*origin.xyz)), rotation_from_rpy(*origin.rpy))
-}
-
-/// The mass at another pose.
-fn moved(inertial: &Inertial, a_from_b: &Pose) -> Inertial {
-    let rotation = a_from_b.rotation.to_rotation_matrix().into_inner();
-    Inertial {
-        mass_kg: inertial.mass_kg,
-        centre_of_mass_in_link: a_from_b * inertial.centre_of_mass_in_link,
-        inertia_in_link: rotation * inertial.inertia_in_link * rotation.transpose(),
-    }
 }
 
 /// Several masses of one rigid link as one (parallel axes).

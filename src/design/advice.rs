@@ -1,0 +1,32 @@
+//! What choosing is worth for this arm and situation, told before anything is measured.
+
+use super::bound::bound;
+use super::candidates::Rules;
+use super::objective::Models;
+use super::outcome::Advice;
+use crate::quality::prediction::Prediction;
+use crate::scene::{Criterion, Scene};
+
+/// Predicts what noise will leave after a calibration with `chosen`, with each of the sets `random`, and with the best set that
+/// there can be. `None` where no configurations determine the parameters.
+#[must_use]
+pub fn advise(scene: &Scene, models: &Models, rules: &Rules<'_>, chosen: &[f64], random: &[Vec<f64>]) -> Option<Advice> {
+    let joints = scene.arm.joint_count();
+    let bound = bound(models, rules, Criterion::IOptimality, scene.design.pool).ok()?;
+    let predicted: Vec<Prediction> = random.iter().filter_map(|set| models.predict(set, joints)).collect();
+    let mean = |of: fn(&Prediction) -> f64| predicted.iter().map(of).sum::<f64>() / predicted.len() as f64;
+    let errors = || predicted.iter().map(|prediction| prediction.position_rms_m);
+    Some(Advice {
+        chosen: models.predict(chosen, joints),
+        random: (!predicted.is_empty()).then(|| Prediction {
+            position_rms_m: mean(|prediction| prediction.position_rms_m),
+            attitude_rms_rad: mean(|prediction| prediction.attitude_rms_rad),
+            position_worst_m: mean(|prediction| prediction.position_worst_m),
+        }),
+        random_range_m: [errors().reduce(f64::min).unwrap_or(0.0), errors().reduce(f64::max).unwrap_or(0.0)],
+        random_undetermined: random.len() - predicted.len(),
+        bound_m: bound.least_rms_m(scene.design.count),
+        bound_gap: bound.gap,
+        bound_candidates: bound.candidates,
+    })
+}

@@ -1,0 +1,124 @@
+//! Cells in which a calibration may find itself: what the sensor sees, how far the joints may turn, what is not modelled.
+//!
+//! The cell around an arm is that of a laser tracker: 15 µm + 6 µm/m, with a probe for the attitude of 0.003°. Every length of the
+//! true arm is wrong by up to ±1 mm, every angle by up to ±0.2°.
+
+use nalgebra::Point3;
+use serde::Serialize;
+
+use crate::measurement::{Sensor, View};
+use crate::scene::{Injected, JointClearance, Noise, Scene, Thermal, ThermalProfile, Weights};
+
+/// Half of what a joint may turn about the middle of its range where joints are limited, rad.
+const LIMITED_RAD: f64 = std::f64::consts::FRAC_PI_3;
+/// Half angle of the cone that a tracker sees, rad.
+const CONE_RAD: f64 = 12.0 * std::f64::consts::PI / 180.0;
+
+/// What the sensor reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sees {
+    /// Position and attitude.
+    Pose,
+    /// Position only.
+    Position,
+}
+
+/// Which configurations may be measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reach {
+    /// All that the arm can take.
+    Free,
+    /// Joints within ±60° of the middle of their ranges, for the verification too.
+    Limited,
+    /// Those whose end point the tracker sees: a cone of ±12°. The verification is everywhere.
+    Cone,
+}
+
+/// A situation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Situation {
+    /// What the sensor reads.
+    pub sees: Sees,
+    /// Which configurations may be measured.
+    pub reach: Reach,
+    /// Whether joints have play (30 µm and 100 µrad in every second one) and links warm and cool by up to 10 K, which the model
+    /// does not know.
+    pub effects: bool,
+    /// Configurations that are measured.
+    pub count: usize,
+}
+
+impl Situation {
+    /// The scene of this situation with the arm of `base`.
+    #[must_use]
+    pub fn scene(self, base: &Scene) -> Scene {
+        let mut scene = base.clone();
+        let position = Point3::new(2.2, 0.6, 0.4);
+        scene.sensor = Sensor {
+            position_in_base: position,
+            position_sigma_m: 15e-6,
+            position_sigma_per_m: 6e-6,
+            attitude_sigma_rad: (self.sees == Sees::Pose).then_some(0.003 * std::f64::consts::PI / 180.0),
+            temperature_sigma_k: None,
+            view: (self.reach == Reach::Cone)
+                .then(|| View { towards_in_base: Point3::new(0.4, 0.0, 0.5), half_angle_rad: CONE_RAD }),
+        };
+        if self.reach == Reach::Limited {
+            limit(&mut scene, LIMITED_RAD);
+        }
+        scene.weights = Weights::Noise;
+        scene.design.count = self.count;
+        scene.plan.held_out_count = 30;
+        scene.plan.held_out_exact = true;
+        scene
+    }
+
+    /// What is hidden in it.
+    #[must_use]
+    pub fn injected(self, base: &Scene) -> Injected {
+        let joints = base.arm.joint_count();
+        let clearance = |joint| JointClearance { joint, radial_m: 30e-6, axial_m: 10e-6, tilt_rad: 100e-6 };
+        let thermal = Thermal {
+            expansion_per_k: (0..=joints).map(|link| if link == 0 { 12e-6 } else { 23e-6 }).collect(),
+            // Most where the large motors are, least at the base and the tool.
+            rise_k: (0..=joints)
+                .map(|link| 3.0 + 7.0 * libm::sin(std::f64::consts::PI * link as f64 / (joints + 1) as f64))
+                .collect(),
+            profile: ThermalProfile::HeatAndCool,
+        };
+        Injected {
+            seed: "0f4d1c6be28a73955b1e90d7c3a64f82".to_owned(),
+            length_error_m: 1e-3,
+            angle_error_rad: 0.2 * std::f64::consts::PI / 180.0,
+            parameter_errors: Vec::new(),
+            clearances: if self.effects { (1..joints).step_by(2).map(clearance).collect() } else { Vec::new() },
+            thermal: self.effects.then_some(thermal),
+            noise: Noise::Declared { factor: 1.0 },
+        }
+    }
+
+    /// In words, without the count.
+    #[must_use]
+    pub fn words(self) -> String {
+        let sees = match self.sees {
+            Sees::Pose => "pose",
+            Sees::Position => "position",
+        };
+        let reach = match self.reach {
+            Reach::Free => "joints free",
+            Reach::Limited => "joints ±60°",
+            Reach::Cone => "cone ±12°",
+        };
+        format!("{sees}, {reach}, effects {}", if self.effects { "on" } else { "off" })
+    }
+}
+
+/// Cuts every joint of `scene` to ±`half` (rad, or m) about the middle of its range.
+pub fn limit(scene: &mut Scene, half: f64) {
+    for joint in &mut scene.arm.chain.joints {
+        let middle = 0.5 * (joint.lower + joint.upper);
+        (joint.lower, joint.upper) = (joint.lower.max(middle - half), joint.upper.min(middle + half));
+    }
+}

@@ -1,0 +1,127 @@
+//! What many trials say: means with their intervals, ratios, and rank correlations.
+
+use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+use statrs::statistics::Statistics;
+
+/// A mean over trials.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Mean {
+    /// Mean.
+    pub mean: f64,
+    /// 95 % confidence interval of the mean (Student); absent for a single trial.
+    pub interval95: Option<[f64; 2]>,
+    /// Trials.
+    pub trials: usize,
+}
+
+impl Mean {
+    /// `None` where there are no values.
+    #[must_use]
+    pub fn of(values: &[f64]) -> Option<Mean> {
+        if values.is_empty() {
+            return None;
+        }
+        let mean = values.iter().mean();
+        Some(Mean { mean, interval95: around(mean, values.iter().std_dev(), values.len()), trials: values.len() })
+    }
+
+    /// The same in another unit.
+    #[must_use]
+    pub fn times(self, factor: f64) -> Mean {
+        let interval95 = self
+            .interval95
+            .map(|[low, high]| if factor < 0.0 { [factor * high, factor * low] } else { [factor * low, factor * high] });
+        Mean { mean: factor * self.mean, interval95, ..self }
+    }
+
+    /// By which share `better` is smaller than `worse` on average, trial by trial the same true arm, verification and noise: one
+    /// minus the ratio of the means, with its 95 % interval (delta method on the paired trials). `None` where there are no trials
+    /// or the means are zero.
+    ///
+    /// # Panics
+    /// If the trials are not paired.
+    #[must_use]
+    pub fn gain(better: &[f64], worse: &[f64]) -> Option<Mean> {
+        assert_eq!(better.len(), worse.len(), "trials are compared in pairs");
+        let base = Mean::of(worse).filter(|base| base.mean != 0.0)?.mean;
+        let ratio = better.iter().mean() / base;
+        let rest: Vec<f64> = better.iter().zip(worse).map(|(better, worse)| (better - ratio * worse) / base).collect();
+        Some(Mean { mean: 1.0 - ratio, interval95: around(1.0 - ratio, rest.iter().std_dev(), rest.len()), trials: rest.len() })
+    }
+}
+
+/// Student's interval about `mean` of `count` values with standard deviation `deviation`.
+fn around(mean: f64, deviation: f64, count: usize) -> Option<[f64; 2]> {
+    let distribution = StudentsT::new(0.0, 1.0, count as f64 - 1.0).ok()?;
+    let half = distribution.inverse_cdf(0.975) * deviation / (count as f64).sqrt();
+    Some([mean - half, mean + half])
+}
+
+/// Spearman's rank correlation of two samples; ties share their ranks. `None` where one of them does not vary, or there are fewer
+/// than three pairs.
+///
+/// # Panics
+/// If the samples are of different length.
+#[must_use]
+pub fn rank_correlation(a: &[f64], b: &[f64]) -> Option<f64> {
+    assert_eq!(a.len(), b.len(), "a correlation is of pairs");
+    if a.len() < 3 || a.iter().chain(b).any(|value| value.is_nan()) {
+        return None;
+    }
+    let (a, b) = (ranks(a), ranks(b));
+    // Ranks from 1 to n have this mean, ties or not.
+    let mean = (a.len() as f64 + 1.0) / 2.0;
+    let sum = |f: &dyn Fn(f64, f64) -> f64| a.iter().zip(&b).map(|(a, b)| f(a - mean, b - mean)).sum::<f64>();
+    let norm = (sum(&|a, _| a * a) * sum(&|_, b| b * b)).sqrt();
+    (norm > 0.0).then(|| sum(&|a, b| a * b) / norm)
+}
+
+/// Rank of each value, from 1; ties share the mean of their ranks.
+fn ranks(values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+    let mut ranks = vec![0.0; values.len()];
+    for tied in order.chunk_by(|a, b| values[*a] == values[*b]) {
+        let first = order.partition_point(|other| values[*other].total_cmp(&values[tied[0]]).is_lt());
+        tied.iter().for_each(|index| ranks[*index] = first as f64 + (tied.len() as f64 + 1.0) / 2.0);
+    }
+    ranks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_has_students_interval() {
+        let mean = Mean::of(&[1.0, 2.0, 3.0, 4.0]).unwrap();
+        assert_eq!(mean.mean, 2.5);
+        // t(0.975, 3) = 3.18245, s = 1.290994.
+        let [low, high] = mean.interval95.unwrap();
+        assert!((high - 2.5 - 3.182_446 * 1.290_994 / 2.0).abs() < 1e-5 && (low + high - 5.0).abs() < 1e-12);
+        assert!(Mean::of(&[1.0]).unwrap().interval95.is_none() && Mean::of(&[]).is_none());
+        assert_eq!(
+            Mean::of(&[1.0, 2.0]).unwrap().times(-1.0).interval95.unwrap()[0],
+            -Mean::of(&[1.0, 2.0]).unwrap().interval95.unwrap()[1]
+        );
+    }
+
+    #[test]
+    fn a_constant_gain_is_certain() {
+        let gain = Mean::gain(&[0.5, 1.0, 2.0], &[1.0, 2.0, 4.0]).unwrap();
+        assert_eq!((gain.mean, gain.interval95), (0.5, Some([0.5, 0.5])));
+        assert!(Mean::gain(&[1.0], &[0.0]).is_none());
+    }
+
+    #[test]
+    fn rank_correlation_by_hand() {
+        assert_eq!(rank_correlation(&[1.0, 2.0, 3.0], &[10.0, 20.0, 1e9]), Some(1.0));
+        assert_eq!(rank_correlation(&[1.0, 2.0, 3.0], &[3.0, 2.0, 1.0]), Some(-1.0));
+        // Ties: ranks 1, 2.5, 2.5, 4 against 1 … 4 give √0.9.
+        let tied = rank_correlation(&[1.0, 2.0, 2.0, 3.0], &[1.0, 2.0, 3.0, 4.0]).unwrap();
+        assert!((tied - 0.9f64.sqrt()).abs() < 1e-12, "{tied}");
+        assert_eq!(rank_correlation(&[1.0, 1.0, 1.0], &[1.0, 2.0, 3.0]), None);
+        assert_eq!(rank_correlation(&[1.0, f64::NEG_INFINITY, 0.0], &[1.0, 2.0, 3.0]), Some(-0.5));
+    }
+}
