@@ -167,7 +167,7 @@ pub(crate) enum Format {
 
 #[derive(Debug, Args)]
 pub(crate) struct ReproduceOptions {
-    /// Experiments; all if none is named
+    /// Experiments; all of the paper's if none is named
     #[arg(value_name = "ITEM", value_parser = items())]
     pub(crate) items: Vec<String>,
     /// Scene in place of the arms of the project; may be given again
@@ -182,7 +182,8 @@ pub(crate) struct ReproduceOptions {
 fn items() -> PossibleValuesParser {
     let named = crate::experiments::ALL
         .iter()
+        .chain(crate::experiments::BEYOND)
         .map(|experiment| PossibleValue::new(experiment.name).help(format!("{}: {}", experiment.place, experiment.about)));
-    let everything = PossibleValue::new(super::reproduce::EVERYTHING).help("All of them");
+    let everything = PossibleValue::new(super::reproduce::EVERYTHING).help("All of the paper's: tables and figures");
     PossibleValuesParser::new(named.chain([everything]).collect::<Vec<_>>())
 }

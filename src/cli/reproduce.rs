@@ -15,7 +15,7 @@ use crate::cell;
 use crate::experiments::arms::arms;
 use crate::experiments::bench::{Bench, Watcher};
 use crate::experiments::findings::Findings;
-use crate::experiments::{ALL, Experiment};
+use crate::experiments::{ALL, BEYOND, Experiment};
 use crate::recording::truth_file::write_whole;
 use crate::report::findings as report;
 use crate::scene::{self, SceneFile};
@@ -70,10 +70,11 @@ pub(crate) fn command(global: &Global, options: &ReproduceOptions) -> anyhow::Re
     Ok(Outcome::Good)
 }
 
-/// The experiments by their names, each once, in the order of the paper; all where there is none.
+/// The experiments by their names, each once, in the order of the paper; all of the paper's where there is none.
 fn chosen(names: &[String]) -> Vec<&'static Experiment> {
     let all = names.is_empty() || names.iter().any(|name| name == EVERYTHING);
-    ALL.iter().filter(|experiment| all || names.iter().any(|name| name == experiment.name)).collect()
+    let named = |experiment: &&Experiment| names.iter().any(|name| name == experiment.name);
+    ALL.iter().filter(|experiment| all || named(experiment)).chain(BEYOND.iter().filter(named)).collect()
 }
 
 /// Scenes by their paths, or those of all arms.

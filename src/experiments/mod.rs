@@ -38,7 +38,10 @@ pub struct Experiment {
     pub run: fn(&Bench<'_>, usize) -> Result<Findings, SessionError>,
 }
 
-/// All experiments in the order of the paper.
+/// Experiments that go beyond the paper: each is asked for by its name.
+pub const BEYOND: &[Experiment] = &[bake_off::EXPERIMENT];
+
+/// The paper's experiments in its order.
 pub const ALL: &[Experiment] = &[
     globality::EXPERIMENT,
     quality::EXPERIMENT,

@@ -43,7 +43,7 @@ pub struct Situation {
     pub sees: Sees,
     /// Which configurations may be measured.
     pub reach: Reach,
-    /// Whether joints have play (30 µm and 100 µrad in every second one) and links warm and cool by up to 10 K, which the model
+    /// Whether joints have play (30 µm and 100 µrad in the second and the fourth) and links warm and cool by up to 10 K, which the model
     /// does not know.
     pub effects: bool,
     /// Configurations that are measured.
@@ -93,7 +93,11 @@ impl Situation {
             length_error_m: 1e-3,
             angle_error_rad: 0.2 * std::f64::consts::PI / 180.0,
             parameter_errors: Vec::new(),
-            clearances: if self.effects { (1..joints).step_by(2).map(clearance).collect() } else { Vec::new() },
+            clearances: if self.effects {
+                [1, 3].into_iter().filter(|joint| *joint < joints).map(clearance).collect()
+            } else {
+                Vec::new()
+            },
             thermal: self.effects.then_some(thermal),
             noise: Noise::Declared { factor: 1.0 },
         }

@@ -1,11 +1,12 @@
 //! One calibration of a simulated arm, judged on configurations that it has not seen.
 
 use crate::cell::measure;
-use crate::cell::measure::{Planned, plan};
+use crate::cell::measure::plan;
 use crate::design::search::split;
-use crate::identification::identify;
+use crate::identification::identify_on;
 use crate::identification::outcome::{Errors, Identification, Residual};
-use crate::measurement::Role;
+use crate::measurement::{Measurement, Role};
+use crate::quality::subspace::Subspace;
 use crate::recording::event::Nobody;
 use crate::scene::{Injected, Scene};
 use crate::seed::derive;
@@ -16,7 +17,15 @@ use crate::session::SessionError;
 pub struct Trial<'a> {
     scene: Scene,
     injected: &'a Injected,
-    held_out: Vec<Vec<f64>>,
+    structure: Subspace,
+    verification: Verification,
+}
+
+enum Verification {
+    /// Read by an exact reference: measured once, in a session of its own.
+    Measured(Vec<Measurement>),
+    /// Read by the sensor, among the others.
+    Planned(Vec<Vec<f64>>),
 }
 
 /// How a calibration ended.
@@ -38,12 +47,19 @@ impl<'a> Trial<'a> {
     /// Trial `number` of `scene`.
     ///
     /// # Errors
-    /// If no verification configuration is within the rules.
+    /// If no verification configuration is within the rules, or it cannot be measured.
     pub fn new(scene: &Scene, injected: &'a Injected, number: usize) -> Result<Self, SessionError> {
         let mut scene = scene.clone();
         scene.seed = derive(scene.seed, number as u64);
         let held_out = crate::design::held_out(&scene)?;
-        Ok(Trial { scene, injected, held_out })
+        let verification = if scene.plan.held_out_exact {
+            let planned = plan(&scene, &[], &held_out);
+            Verification::Measured(measure(&scene, injected, &planned, planned.len(), &mut Nobody)?.0)
+        } else {
+            Verification::Planned(held_out)
+        };
+        let structure = Subspace::of_structure(&scene.arm, scene.sensor.attitude_sigma_rad.is_some());
+        Ok(Trial { scene, injected, structure, verification })
     }
 
     /// The trial's seed, for what is drawn in it.
@@ -52,23 +68,34 @@ impl<'a> Trial<'a> {
         self.scene.seed
     }
 
-    /// Measures `chosen` (configurations one after the other, rad or m) and the verification, and identifies.
+    /// Measures `chosen` (configurations one after the other, rad or m), and the verification with it where that is not exact, and
+    /// identifies.
     ///
     /// # Errors
     /// Whatever a step reports.
     pub fn calibrate(&self, chosen: &[f64]) -> Result<Calibrated, SessionError> {
-        let planned: Vec<Planned> = plan(&self.scene, &split(chosen, self.scene.arm.joint_count()), &self.held_out);
-        let (measurements, _) = measure(&self.scene, self.injected, &planned, planned.len(), &mut Nobody)?;
-        let identification = identify(&self.scene.arm, &self.scene.sensor, self.scene.weights, &measurements)?;
+        let chosen = split(chosen, self.scene.arm.joint_count());
+        let (planned, verification) = match &self.verification {
+            Verification::Measured(measured) => (plan(&self.scene, &chosen, &[]), measured.as_slice()),
+            Verification::Planned(held_out) => (plan(&self.scene, &chosen, held_out), [].as_slice()),
+        };
+        let (mut measurements, _) = measure(&self.scene, self.injected, &planned, planned.len(), &mut Nobody)?;
+        measurements.extend_from_slice(verification);
+        let (arm, sensor) = (&self.scene.arm, &self.scene.sensor);
+        let identification = identify_on(&self.structure, arm, sensor, self.scene.weights, &measurements)?;
+        let mut held_out: Vec<(usize, &Residual)> = measurements
+            .iter()
+            .zip(&identification.residuals)
+            .filter(|(measurement, _)| measurement.role == Role::HeldOut)
+            .map(|(measurement, residual)| (measurement.pose_id, residual))
+            .collect();
+        held_out.sort_by_key(|(pose_id, _)| *pose_id);
         let missing = || SessionError::NothingHeldOut;
-        let held_out = identification.residuals.iter().filter(|residual| planned[residual.index].role == Role::HeldOut);
-        let mut verification: Vec<Residual> = held_out.cloned().collect();
-        verification.sort_by_key(|residual| planned[residual.index].pose_id);
         Ok(Calibrated {
             converged: identification.converged,
             after: identification.held_out.clone().ok_or_else(missing)?,
             before: identification.held_out_nominal.clone().ok_or_else(missing)?,
-            verification,
+            verification: held_out.into_iter().map(|(_, residual)| residual.clone()).collect(),
             identification,
         })
     }

@@ -91,6 +91,27 @@ pub fn identify(
     weights: Weights,
     measurements: &[Measurement],
 ) -> Result<Identification, IdentificationError> {
+    let structure = Subspace::of_structure(arm, sensor.attitude_sigma_rad.is_some() && measures_attitude(measurements));
+    identify_on(&structure, arm, sensor, weights, measurements)
+}
+
+/// Whether every measurement to fit has an attitude: else positions are fitted only.
+fn measures_attitude(measurements: &[Measurement]) -> bool {
+    let mut fitted = measurements.iter().filter(|measurement| measurement.role == crate::measurement::Role::Fit);
+    fitted.all(|measurement| measurement.attitude_xyzw.is_some())
+}
+
+/// [`identify`] for many sets of measurements of one arm, whose structure (for what is measured of a pose) is told once.
+///
+/// # Errors
+/// As [`identify`].
+pub fn identify_on(
+    structure: &Subspace,
+    arm: &Arm,
+    sensor: &Sensor,
+    weights: Weights,
+    measurements: &[Measurement],
+) -> Result<Identification, IdentificationError> {
     use crate::measurement::Role;
     for measurement in measurements {
         if measurement.joints.len() != arm.joint_count() {
@@ -107,7 +128,6 @@ pub fn identify(
     let nominal = arm.chain.nominal();
 
     let equations = problem.equations();
-    let structure = Subspace::of_structure(arm, problem.rows_per_pose == 6);
     let structural = structure.rank();
     if equations < structural {
         let needed = structural.div_ceil(problem.rows_per_pose);
