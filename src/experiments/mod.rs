@@ -2,6 +2,7 @@
 //!
 //! One file per experiment of Chen et al. 2019; each returns [`findings::Findings`]: the paper's numbers beside ours.
 
+pub mod advice;
 pub mod arms;
 pub mod bake_off;
 pub mod bench;
@@ -39,7 +40,7 @@ pub struct Experiment {
 }
 
 /// Experiments that go beyond the paper: each is asked for by its name.
-pub const BEYOND: &[Experiment] = &[bake_off::EXPERIMENT];
+pub const BEYOND: &[Experiment] = &[bake_off::EXPERIMENT, advice::EXPERIMENT];
 
 /// The paper's experiments in its order.
 pub const ALL: &[Experiment] = &[
