@@ -244,28 +244,27 @@ impl Situation {
 
     fn claims(&self, published: Option<&super::published::Headline>, claims: &mut Vec<Claim>) {
         let (name, most) = (self.name(), self.most().map(|most| 100.0 * most));
-        for set in 1..3 {
+        for (set, label) in SETS.iter().enumerate().skip(1) {
             // The paper has a set for O_C only.
             let paper = published.filter(|_| set == 1);
             let percent = |gain: Option<Mean>| gain.map(|gain| gain.times(100.0));
             claims.push(
                 Claim::new(
-                    format!("gain in position error, {}, {name} (%)", SETS[set]),
+                    format!("gain in position error, {}, {name} (%)", label),
                     paper.map(|paper| paper.position_gain_percent),
                     percent(self.gain(set, Fit::position_mm)),
                 )
                 .bounded(most),
             );
             let predicted = self.predicted_gain(&self.predicted, set).map(|gain| 100.0 * gain);
-            claims.push(
-                Claim::single(format!("  as predicted from noise, {}, {name} (%)", SETS[set]), None, predicted).bounded(most),
-            );
+            claims
+                .push(Claim::single(format!("  as predicted from noise, {}, {name} (%)", label), None, predicted).bounded(most));
             if let Some(gain) = percent(self.gain(set, Fit::attitude_deg)) {
                 let paper = paper.map(|paper| paper.attitude_gain_percent);
-                claims.push(Claim::new(format!("gain in attitude error, {}, {name} (%)", SETS[set]), paper, Some(gain)));
+                claims.push(Claim::new(format!("gain in attitude error, {}, {name} (%)", label), paper, Some(gain)));
                 let predicted = self.predicted_gain(&self.predicted_attitude, set).map(|gain| 100.0 * gain);
                 claims.push(Claim::single(
-                    format!("  as predicted from noise, attitude, {}, {name} (%)", SETS[set]),
+                    format!("  as predicted from noise, attitude, {}, {name} (%)", label),
                     None,
                     predicted,
                 ));

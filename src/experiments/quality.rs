@@ -49,6 +49,12 @@ struct Sample {
     fit: Fit,
 }
 
+/// A number of the error after a fit.
+type Error = fn(&Fit) -> f64;
+
+/// Rank correlation of an index, by its number, and an error, over the trials.
+type Correlate<'c> = dyn Fn(&[Sets], usize, Error) -> Option<Mean> + 'c;
+
 /// Sets of one trial in the order of the ranges.
 type Sets = Vec<Sample>;
 
@@ -235,13 +241,8 @@ fn error_figure(arm: &str, index: usize, across: &[Sets], within: &[Sets], publi
         .with(panel("(d) attitude, whole ranges only", attitude, within, Fit::attitude_deg, None))
 }
 
-fn correlation_figure(
-    arm: &str,
-    across: &[Sets],
-    within: &[Sets],
-    rho: &dyn Fn(&[Sets], usize, fn(&Fit) -> f64) -> Option<Mean>,
-) -> Figure {
-    let columns: [(&str, &[Sets], fn(&Fit) -> f64); 4] = [
+fn correlation_figure(arm: &str, across: &[Sets], within: &[Sets], rho: &Correlate<'_>) -> Figure {
+    let columns: [(&str, &[Sets], Error); 4] = [
         ("ranges, position", across, Fit::position_mm),
         ("ranges, attitude", across, Fit::attitude_deg),
         ("whole, position", within, Fit::position_mm),
