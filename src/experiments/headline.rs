@@ -99,7 +99,7 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
     let most = own.most();
     let why = match most {
         Some(most) if most < paper => format!(
-            "; it cannot be had, for no set of {} leaves more than {:.1} % less than random sets of the noise's error (RMS)",
+            "; it cannot be had: no set of {} lets noise leave an RMS more than {:.1} % below that of random sets",
             own.count,
             100.0 * most
         ),
