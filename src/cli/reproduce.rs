@@ -35,6 +35,8 @@ pub(crate) fn command(global: &Global, options: &ReproduceOptions) -> anyhow::Re
             "two scenes are called {}: their files would overwrite each other; give one at a time",
             scenes[index].0.scene.name
         );
+    }
+    for folder in &folders {
         std::fs::create_dir_all(folder)
             .with_context(|| format!("cannot make the folder {}; choose another folder with --out", folder.display()))?;
     }

@@ -49,6 +49,9 @@ const NAMES: [&str; 3] = ["A", "B", "C"];
 /// What they are.
 const LABELS: [&str; 3] = ["A, narrow joint ranges", "B, whole ranges", "C, whole ranges, end points in a ball"];
 
+/// A number of errors over the verification: its name, ours, and the paper's.
+type Part = (&'static str, fn(&Summary) -> f64, fn(&Extremes) -> f64);
+
 /// Where the end points of C may lie.
 struct Ball {
     centre: Vector3<f64>,
@@ -135,7 +138,7 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
         };
         let unit = if kind == "position" { "mm" } else { "°" };
         let mut add = |name: &str, paper: Option<Extremes>, set: usize, before: bool| {
-            let parts: [(&str, fn(&Summary) -> f64, fn(&Extremes) -> f64); 3] =
+            let parts: [Part; 3] =
                 [("max", |s| s.max, |e| e.max), ("min", |s| s.min, |e| e.min), ("mean", |s| s.mean, |e| e.mean)];
             for (part, which, published) in parts {
                 let ours = mean(fits(set), |fit| get(if before { &fit.before } else { &fit.after }, which));

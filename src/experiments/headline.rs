@@ -99,7 +99,7 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
     let most = own.most();
     let why = match most {
         Some(most) if most < paper => format!(
-            "; it cannot be had, for no set of {} leaves more than {:.1} % less than random sets of the noise's error (RMS)",
+            "; it cannot be had: no set of {} lets noise leave an RMS more than {:.1} % below that of random sets",
             own.count,
             100.0 * most
         ),
@@ -244,28 +244,27 @@ impl Situation {
 
     fn claims(&self, published: Option<&super::published::Headline>, claims: &mut Vec<Claim>) {
         let (name, most) = (self.name(), self.most().map(|most| 100.0 * most));
-        for set in 1..3 {
+        for (set, label) in SETS.iter().enumerate().skip(1) {
             // The paper has a set for O_C only.
             let paper = published.filter(|_| set == 1);
             let percent = |gain: Option<Mean>| gain.map(|gain| gain.times(100.0));
             claims.push(
                 Claim::new(
-                    format!("gain in position error, {}, {name} (%)", SETS[set]),
+                    format!("gain in position error, {}, {name} (%)", label),
                     paper.map(|paper| paper.position_gain_percent),
                     percent(self.gain(set, Fit::position_mm)),
                 )
                 .bounded(most),
             );
             let predicted = self.predicted_gain(&self.predicted, set).map(|gain| 100.0 * gain);
-            claims.push(
-                Claim::single(format!("  as predicted from noise, {}, {name} (%)", SETS[set]), None, predicted).bounded(most),
-            );
+            claims
+                .push(Claim::single(format!("  as predicted from noise, {}, {name} (%)", label), None, predicted).bounded(most));
             if let Some(gain) = percent(self.gain(set, Fit::attitude_deg)) {
                 let paper = paper.map(|paper| paper.attitude_gain_percent);
-                claims.push(Claim::new(format!("gain in attitude error, {}, {name} (%)", SETS[set]), paper, Some(gain)));
+                claims.push(Claim::new(format!("gain in attitude error, {}, {name} (%)", label), paper, Some(gain)));
                 let predicted = self.predicted_gain(&self.predicted_attitude, set).map(|gain| 100.0 * gain);
                 claims.push(Claim::single(
-                    format!("  as predicted from noise, attitude, {}, {name} (%)", SETS[set]),
+                    format!("  as predicted from noise, attitude, {}, {name} (%)", label),
                     None,
                     predicted,
                 ));

@@ -49,6 +49,30 @@ struct Sample {
     fit: Fit,
 }
 
+impl Sample {
+    /// Position RMS that noise lets expect, mm.
+    fn expected_mm(&self) -> f64 {
+        MM * libm::exp(-0.5 * self.indexes[I_OPTIMALITY])
+    }
+
+    fn position_mm(&self) -> f64 {
+        self.fit.position_mm()
+    }
+
+    fn attitude_deg(&self) -> f64 {
+        self.fit.attitude_deg()
+    }
+}
+
+/// A number of the error of a set.
+type Error = fn(&Sample) -> f64;
+
+/// Rank correlation of an index, by its number, and an error, over the trials.
+type Correlate<'c> = dyn Fn(&[Sets], usize, Error) -> Option<Mean> + 'c;
+
+/// Number of the criterion of I-optimality in [`INDEXES`].
+const I_OPTIMALITY: usize = 12;
+
 /// Sets of one trial in the order of the ranges.
 type Sets = Vec<Sample>;
 
@@ -86,14 +110,14 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
     };
     let (across, within) = (by_range(true)?, by_range(false)?);
 
-    let rho = |sets: &[Sets], index: usize, error: fn(&Fit) -> f64| {
+    let rho = |sets: &[Sets], index: usize, error: Error| {
         Mean::of_correlations(
             &sets
                 .iter()
                 .filter_map(|sets| {
                     let kept: Vec<&Sample> = sets.iter().filter(|sample| sample.fit.converged).collect();
                     let values: Vec<f64> = kept.iter().map(|sample| sample.indexes[index]).collect();
-                    let errors: Vec<f64> = kept.iter().map(|sample| error(&sample.fit)).collect();
+                    let errors: Vec<f64> = kept.iter().map(|sample| error(sample)).collect();
                     rank_correlation(&values, &errors)
                 })
                 .collect::<Vec<_>>(),
@@ -117,22 +141,35 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
     }
     for (name, sets) in [("across ranges", &across), ("among sets of the whole range", &within)] {
         for (index, label) in INDEXES.iter().enumerate() {
-            claims.push(Claim::new(format!("ρ of {label} and position error, {name}"), None, rho(sets, index, Fit::position_mm)));
+            claims.push(Claim::new(
+                format!("ρ of {label} and position error, {name}"),
+                None,
+                rho(sets, index, Sample::position_mm),
+            ));
         }
+    }
+
+    for (index, label) in INDEXES.iter().enumerate() {
+        let what = format!("ρ of {label} and position RMS predicted from noise, among sets of the whole range");
+        claims.push(Claim::new(what, None, rho(&within, index, Sample::expected_mm)));
     }
 
     // Of the scene's own scaling.
     let own_index = SCALINGS.iter().position(|(scaling, _)| *scaling == scene.design.jacobian_scaling).unwrap_or(0);
-    let (over_ranges, alike) = (rho(&across, own_index, Fit::position_mm), rho(&within, own_index, Fit::position_mm));
-    let predicted = rho(&within, 12, Fit::position_mm);
+    let (over_ranges, alike) = (rho(&across, own_index, Sample::position_mm), rho(&within, own_index, Sample::position_mm));
+    let expected = rho(&within, own_index, Sample::expected_mm);
+    let all: Vec<f64> = within.iter().flatten().map(Sample::expected_mm).filter(|expected| expected.is_finite()).collect();
+    let [least, most] =
+        [f64::min, f64::max].map(|pick: fn(f64, f64) -> f64| all.iter().copied().reduce(pick).unwrap_or(f64::NAN));
     let verdict = format!(
         "That the error falls with O_C {} across joint ranges (ρ = {}), where both follow the range; among sets of the same whole \
-         range O_C {} (ρ = {}; the predicted variance, I-optimality, has ρ = {}).",
+         range the error of a calibration has ρ = {} with O_C and {} with the predicted variance (I-optimality), and the RMS that \
+         noise lets expect, {least:.3} to {most:.3} mm, has ρ = {} with O_C.",
         if over_ranges.is_some_and(|rho| rho.mean < -0.5) { "holds" } else { "does not hold" },
         correlation(over_ranges),
-        if alike.is_some_and(|rho| below_zero(&rho)) { "tells better sets from worse ones a little" } else { "tells nothing" },
         correlation(alike),
-        correlation(predicted),
+        correlation(rho(&within, I_OPTIMALITY, Sample::position_mm)),
+        correlation(expected),
     );
     let narrow = tally(across.iter().flatten().map(|sample| &sample.fit));
     let all = tally(across.iter().chain(&within).flatten().map(|sample| &sample.fit));
@@ -170,11 +207,6 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
             ("quality-correlation".to_owned(), correlation_figure(&arm.name, &across, &within, &rho)),
         ],
     })
-}
-
-/// Whether the interval lies below zero.
-fn below_zero(rho: &Mean) -> bool {
-    rho.interval95.map_or(rho.mean < 0.0, |interval| interval[1] < 0.0)
 }
 
 fn correlation(rho: Option<Mean>) -> String {
@@ -235,17 +267,13 @@ fn error_figure(arm: &str, index: usize, across: &[Sets], within: &[Sets], publi
         .with(panel("(d) attitude, whole ranges only", attitude, within, Fit::attitude_deg, None))
 }
 
-fn correlation_figure(
-    arm: &str,
-    across: &[Sets],
-    within: &[Sets],
-    rho: &dyn Fn(&[Sets], usize, fn(&Fit) -> f64) -> Option<Mean>,
-) -> Figure {
-    let columns: [(&str, &[Sets], fn(&Fit) -> f64); 4] = [
-        ("ranges, position", across, Fit::position_mm),
-        ("ranges, attitude", across, Fit::attitude_deg),
-        ("whole, position", within, Fit::position_mm),
-        ("whole, attitude", within, Fit::attitude_deg),
+fn correlation_figure(arm: &str, across: &[Sets], within: &[Sets], rho: &Correlate<'_>) -> Figure {
+    let columns: [(&str, &[Sets], Error); 5] = [
+        ("ranges, position", across, Sample::position_mm),
+        ("ranges, attitude", across, Sample::attitude_deg),
+        ("whole, position", within, Sample::position_mm),
+        ("whole, attitude", within, Sample::attitude_deg),
+        ("whole, predicted", within, Sample::expected_mm),
     ];
     let values = (0..INDEXES.len())
         .map(|index| columns.iter().map(|(_, sets, error)| rho(sets, index, *error).map_or(f64::NAN, |rho| -rho.mean)).collect())

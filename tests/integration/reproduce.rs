@@ -122,6 +122,8 @@ fn what_cannot_be_reproduced_is_refused() {
     refuse(&["reproduce", "everything"], &ITEMS);
     refuse(&["reproduce", "sets", "--arm", "missing.toml"], &["missing.toml"]);
     refuse(&["reproduce", "sets", "--arm", "scenes/paper.toml", "--arm", "scenes/paper.toml"], &["two scenes are called paper"]);
+    // Nothing is made before it is refused.
+    assert_eq!(names(folder.path()), Vec::<String>::new());
     fs::write(folder.path().join("reproduce"), "mine").unwrap();
     refuse(&["reproduce", "sets", "--arm", "scenes/paper.toml"], &["cannot make the folder", "--out"]);
 }
