@@ -23,6 +23,8 @@ mod real_data;
 mod replay;
 #[path = "integration/repository.rs"]
 mod repository;
+#[path = "integration/reproduce.rs"]
+mod reproduce;
 #[path = "integration/secrecy.rs"]
 mod secrecy;
 #[path = "integration/steps.rs"]

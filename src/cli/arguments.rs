@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 /// Calibration of robot arms with a physics simulator in the loop.
@@ -76,8 +77,12 @@ pub(crate) enum Command {
         kincal export recordings/arm8.mcap --to urdf        the calibrated arm\n  \
         kincal export recordings/arm8.mcap --to csv         the measurements")]
     Export(ExportOptions),
-    /// Repeat an experiment of Chen et al. 2019 beside its published numbers
-    #[command(after_help = "Example:\n  kincal reproduce count-error --arm scenes/paper.toml --trials 20")]
+    /// Repeat experiments of Chen et al. 2019 beside their published numbers
+    #[command(
+        after_help = "Examples:\n  kincal reproduce                                             everything, on all arms\n  \
+        kincal reproduce count-error --arm scenes/paper.toml --trials 20\n\n\
+        Tables (CSV) and figures (SVG, PNG) go to OUT/reproduce/SCENE/."
+    )]
     Reproduce(ReproduceOptions),
 }
 
@@ -162,19 +167,22 @@ pub(crate) enum Format {
 
 #[derive(Debug, Args)]
 pub(crate) struct ReproduceOptions {
-    /// Experiment
-    #[arg(value_enum)]
-    pub(crate) item: Item,
-    /// Scene in place of the substitute arm
-    #[arg(long, value_name = "SCENE", default_value = "scenes/paper.toml")]
-    pub(crate) arm: PathBuf,
-    /// Calibrations per cell of the table
-    #[arg(long, value_name = "N", default_value = "20", value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    pub(crate) trials: u32,
+    /// Experiments; all if none is named
+    #[arg(value_name = "ITEM", value_parser = items())]
+    pub(crate) items: Vec<String>,
+    /// Scene in place of the arms of the project; may be given again
+    #[arg(long, value_name = "SCENE")]
+    pub(crate) arm: Vec<PathBuf>,
+    /// Trials in place of each experiment's own number
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub(crate) trials: Option<u32>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Item {
-    /// Table 4: held-out error against the number of configurations
-    CountError,
+/// Names of the experiments, with what they repeat.
+fn items() -> PossibleValuesParser {
+    let named = crate::experiments::ALL
+        .iter()
+        .map(|experiment| PossibleValue::new(experiment.name).help(format!("{}: {}", experiment.place, experiment.about)));
+    let everything = PossibleValue::new(super::reproduce::EVERYTHING).help("All of them");
+    PossibleValuesParser::new(named.chain([everything]).collect::<Vec<_>>())
 }

@@ -1,30 +1,166 @@
 //! `kincal reproduce`: experiments of the paper beside its numbers.
 
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::Instant;
+
+use anyhow::{Context, ensure};
+use indicatif::ProgressBar;
 use serde_json::json;
 
 use super::Outcome;
-use super::arguments::{Global, Item, ReproduceOptions};
+use super::arguments::{Global, ReproduceOptions};
 use super::output;
-use crate::{experiments, report, scene};
+use crate::cell;
+use crate::experiments::arms::arms;
+use crate::experiments::bench::{Bench, Watcher};
+use crate::experiments::findings::Findings;
+use crate::experiments::{ALL, Experiment};
+use crate::recording::truth_file::write_whole;
+use crate::report::findings as report;
+use crate::scene::{self, SceneFile};
+
+/// The name that stands for all experiments.
+pub(super) const EVERYTHING: &str = "all";
 
 pub(crate) fn command(global: &Global, options: &ReproduceOptions) -> anyhow::Result<Outcome> {
-    let mut file = scene::read(&options.arm)?;
-    if let Some(seed) = global.seed {
-        file.set_seed(seed)?;
+    let experiments = chosen(&options.items);
+    let scenes = scenes(global, &options.arm)?;
+    // Whatever can be refused is refused before hours are spent.
+    let folders: Vec<PathBuf> =
+        scenes.iter().map(|(file, _)| global.out.join("reproduce").join(output::stem(global, file, ""))).collect();
+    for (index, folder) in folders.iter().enumerate() {
+        ensure!(
+            !folders[..index].contains(folder),
+            "two scenes are called {}: their files would overwrite each other; give one at a time",
+            scenes[index].0.scene.name
+        );
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("cannot make the folder {}; choose another folder with --out", folder.display()))?;
     }
-    let injected = output::injected(&file, &options.arm)?;
-    match options.item {
-        Item::CountError => {
-            let trials = options.trials as usize;
-            let bar = output::progress(global, "calibrating", (experiments::count_error::ROWS * trials) as u64);
-            let rows = experiments::count_error::run(&file.scene, injected, trials, &|| bar.inc(1))?;
-            bar.finish_and_clear();
-            output::show(global, &format!("{}\n{}", file.scene.arm_note, report::count_error(&rows)))?;
-            output::show_json(global, &json!({ "item": "count-error", "arm": file.scene.arm.name, "rows": rows }))?;
-            if rows.iter().any(|row| row.not_converged > 0) {
-                return Ok(Outcome::Bad);
-            }
+    let (mut found, mut files, mut not_converged) = (Vec::new(), Vec::new(), 0);
+    for ((file, path), folder) in scenes.iter().zip(&folders) {
+        let injected = output::injected(file, path)?;
+        output::show(global, &format!("{}: {}\n", file.scene.name, file.scene.arm_note))?;
+        let progress = Progress { global, bar: Mutex::new(None) };
+        let bench = Bench::new(&file.scene, injected, &progress);
+        for experiment in &experiments {
+            let start = Instant::now();
+            let trials = options.trials.map_or(experiment.trials, |trials| trials as usize);
+            let findings = (experiment.run)(&bench, trials)?;
+            progress.end();
+            let written = write(folder, &findings)?;
+            output::note(global, &format!("{} on {}: {:.1} s", experiment.name, findings.arm, start.elapsed().as_secs_f64()));
+            output::show(global, &report::findings(&findings))?;
+            output::show(global, &format!("{}\n", listed(folder, &written)))?;
+            not_converged += findings.fits.not_converged;
+            files.extend(written);
+            found.push(findings);
         }
     }
+    let notes: Vec<_> = scenes
+        .iter()
+        .map(|(file, _)| json!({ "scene": file.scene.name, "arm": file.scene.arm.name, "note": file.scene.arm_note }))
+        .collect();
+    output::show_json(global, &json!({ "arms": notes, "findings": found, "files": files, "not_converged": not_converged }))?;
+    if not_converged > 0 {
+        output::show(global, &format!("{not_converged} fits did not converge.\n"))?;
+        return Ok(Outcome::Bad);
+    }
     Ok(Outcome::Good)
+}
+
+/// The experiments by their names, each once, in the order of the paper; all where there is none.
+fn chosen(names: &[String]) -> Vec<&'static Experiment> {
+    let all = names.is_empty() || names.iter().any(|name| name == EVERYTHING);
+    ALL.iter().filter(|experiment| all || names.iter().any(|name| name == experiment.name)).collect()
+}
+
+/// Scenes by their paths, or those of all arms.
+fn scenes(global: &Global, paths: &[PathBuf]) -> anyhow::Result<Vec<(SceneFile, PathBuf)>> {
+    let mut scenes: Vec<(SceneFile, PathBuf)> = if paths.is_empty() {
+        arms()?.into_iter().map(|file| (file, PathBuf::new())).collect()
+    } else {
+        paths.iter().map(|path| Ok((scene::read(path)?, path.clone()))).collect::<anyhow::Result<_>>()?
+    };
+    ensure!(!scenes.is_empty(), "no scene of an arm is found in scenes/: give one with --arm SCENE");
+    for (file, path) in &mut scenes {
+        if let Some(seed) = global.seed {
+            file.set_seed(seed)?;
+        }
+        cell::measure::check(&file.scene, output::injected(file, path)?)?;
+    }
+    Ok(scenes)
+}
+
+/// Writes the data as CSV and the figures as SVG and PNG; the paths.
+fn write(folder: &Path, findings: &Findings) -> anyhow::Result<Vec<PathBuf>> {
+    let mut written = Vec::new();
+    let mut put = |name: &str, extension: &str, bytes: &[u8]| -> anyhow::Result<()> {
+        let path = folder.join(format!("{name}.{extension}"));
+        output::check_target(&path)?;
+        write_whole(&path, bytes)
+            .with_context(|| format!("cannot write {}; choose another folder with --out", path.display()))?;
+        written.push(path);
+        Ok(())
+    };
+    let claims = report::claims(findings);
+    for data in std::iter::once(&claims).chain(&findings.data) {
+        put(&data.name, "csv", &report::csv(data)?)?;
+    }
+    for (name, figure) in &findings.figures {
+        put(name, "svg", figure.svg()?.as_bytes())?;
+        put(name, "png", &figure.png()?)?;
+    }
+    Ok(written)
+}
+
+/// The files in a line.
+fn listed(folder: &Path, written: &[PathBuf]) -> String {
+    let names: Vec<_> = written.iter().filter_map(|path| path.file_name()).map(|name| name.to_string_lossy()).collect();
+    format!("Written to {}: {}", folder.display(), names.join(", "))
+}
+
+/// Progress bars, one after the other.
+struct Progress<'a> {
+    global: &'a Global,
+    bar: Mutex<Option<ProgressBar>>,
+}
+
+impl Progress<'_> {
+    fn put(&self, bar: Option<ProgressBar>) {
+        if let Ok(mut held) = self.bar.lock()
+            && let Some(old) = std::mem::replace(&mut *held, bar)
+        {
+            old.finish_and_clear();
+        }
+    }
+
+    fn end(&self) {
+        self.put(None);
+    }
+}
+
+impl Watcher for Progress<'_> {
+    fn begin(&self, what: &'static str, steps: usize) {
+        self.put(Some(output::progress(self.global, what, steps as u64)));
+    }
+
+    fn step(&self) {
+        if let Ok(held) = self.bar.lock()
+            && let Some(bar) = &*held
+        {
+            bar.inc(1);
+        }
+    }
+
+    fn remark(&self, text: &str) {
+        match self.bar.lock() {
+            Ok(held) => match &*held {
+                Some(bar) => bar.suspend(|| output::note(self.global, text)),
+                None => output::note(self.global, text),
+            },
+            Err(_) => output::note(self.global, text),
+        }
+    }
 }

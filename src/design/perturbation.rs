@@ -118,7 +118,7 @@ impl Walk<'_, '_> {
 /// None if the budget does not last for it.
 fn excursion(task: &Task<'_>, configurations: &[f64], stream: &mut Stream) -> Result<Option<Vec<f64>>, SearchError> {
     let joints = task.arm().joint_count();
-    let candidates = task.pool.min(CANDIDATES).max(1);
+    let candidates = task.pool.clamp(1, CANDIDATES);
     let mut pool = configurations.to_vec();
     pool.extend(task.draw(stream, candidates)?);
     let mut set = PoolSet::new(task, &pool, (0..task.count).collect());

@@ -20,12 +20,25 @@ pub struct Findings {
     pub verdict: String,
     /// Sentences about what was assumed or left out.
     pub notes: Vec<String>,
+    /// The fits behind the numbers.
+    pub fits: Tally,
     /// Data behind the figures, for CSV.
     #[serde(skip)]
     pub data: Vec<Data>,
     /// Figures with their file names (without extension).
     #[serde(skip)]
     pub figures: Vec<(String, Figure)>,
+}
+
+/// How fits ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
+pub struct Tally {
+    /// Fits made.
+    pub fits: usize,
+    /// Of them, those that did not converge; they are left out of all means.
+    pub not_converged: usize,
+    /// Of them, those that held combinations at nominal because the set does not show them; they are in the means.
+    pub held: usize,
 }
 
 /// A number of the paper and ours.
@@ -41,6 +54,26 @@ pub struct Claim {
     pub bound: Option<f64>,
 }
 
+impl Claim {
+    /// Without a bound.
+    #[must_use]
+    pub fn new(what: impl Into<String>, paper: Option<f64>, ours: Option<Mean>) -> Self {
+        Claim { what: what.into(), paper, ours, bound: None }
+    }
+
+    /// A number that is no mean over trials.
+    #[must_use]
+    pub fn single(what: impl Into<String>, paper: Option<f64>, ours: Option<f64>) -> Self {
+        Claim::new(what, paper, ours.map(|mean| Mean { mean, interval95: None, trials: 1 }))
+    }
+
+    /// With a bound.
+    #[must_use]
+    pub fn bounded(self, bound: Option<f64>) -> Self {
+        Claim { bound, ..self }
+    }
+}
+
 /// A table of numbers for CSV.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Data {
@@ -52,4 +85,20 @@ pub struct Data {
     pub rows: Vec<Vec<f64>>,
     /// Text of the first columns of each row, where rows have names; as many columns for every row.
     pub labels: Vec<Vec<String>>,
+}
+
+impl Data {
+    /// A table whose rows have no names.
+    #[must_use]
+    pub fn new(name: impl Into<String>, columns: &[&str], rows: Vec<Vec<f64>>) -> Self {
+        let columns = columns.iter().map(|column| (*column).to_owned()).collect();
+        Data { name: name.into(), columns, rows, labels: Vec::new() }
+    }
+
+    /// A table whose first columns are text.
+    #[must_use]
+    pub fn labelled(name: impl Into<String>, columns: &[&str], rows: Vec<(Vec<String>, Vec<f64>)>) -> Self {
+        let (labels, rows) = rows.into_iter().unzip();
+        Data { labels, ..Data::new(name, columns, rows) }
+    }
 }

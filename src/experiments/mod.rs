@@ -1,7 +1,50 @@
 //! Experiments that know the truth and the answer: the only place that holds both.
+//!
+//! One file per experiment of Chen et al. 2019; each returns [`findings::Findings`]: the paper's numbers beside ours.
 
+pub mod arms;
 pub mod bake_off;
+pub mod bench;
 pub mod count_error;
+pub mod count_index;
+pub mod findings;
+pub mod globality;
+pub mod headline;
+pub mod limits;
+pub mod optimise;
+mod pictures;
+pub mod published;
+pub mod quality;
+pub mod sets;
 pub mod situation;
 pub mod statistics;
 pub mod trial;
+
+use crate::session::SessionError;
+use bench::Bench;
+use findings::Findings;
+
+/// An experiment by its name.
+pub struct Experiment {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// What it repeats.
+    pub place: &'static str,
+    /// In a few words.
+    pub about: &'static str,
+    /// Trials if nobody asks for another number: the paper's, or enough for a decent interval.
+    pub trials: usize,
+    /// Makes as many trials.
+    pub run: fn(&Bench<'_>, usize) -> Result<Findings, SessionError>,
+}
+
+/// All experiments in the order of the paper.
+pub const ALL: &[Experiment] = &[
+    globality::EXPERIMENT,
+    quality::EXPERIMENT,
+    count_index::EXPERIMENT,
+    count_error::EXPERIMENT,
+    optimise::EXPERIMENT,
+    sets::EXPERIMENT,
+    headline::EXPERIMENT,
+];

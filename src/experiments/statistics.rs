@@ -35,6 +35,15 @@ impl Mean {
         Mean { mean: factor * self.mean, interval95, ..self }
     }
 
+    /// Of correlations: Fisher's z has Student's interval, so that none goes beyond ±1. `None` where there are no values.
+    #[must_use]
+    pub fn of_correlations(values: &[f64]) -> Option<Mean> {
+        // A perfect correlation has no finite z.
+        let z: Vec<f64> = values.iter().map(|value| libm::atanh(value.clamp(-1.0 + 1e-12, 1.0 - 1e-12))).collect();
+        let mean = Mean::of(&z)?;
+        Some(Mean { mean: libm::tanh(mean.mean), interval95: mean.interval95.map(|ends| ends.map(libm::tanh)), ..mean })
+    }
+
     /// By which share `better` is smaller than `worse` on average, trial by trial the same true arm, verification and noise: one
     /// minus the ratio of the means, with its 95 % interval (delta method on the paired trials). `None` where there are no trials
     /// or the means are zero.
@@ -105,6 +114,17 @@ mod tests {
             Mean::of(&[1.0, 2.0]).unwrap().times(-1.0).interval95.unwrap()[0],
             -Mean::of(&[1.0, 2.0]).unwrap().interval95.unwrap()[1]
         );
+    }
+
+    #[test]
+    fn correlations_stay_within_one() {
+        let mean = Mean::of_correlations(&[-0.99, -0.5]).unwrap();
+        // tanh of the mean of −2.64665 and −0.54931.
+        assert!((mean.mean + 0.921_318).abs() < 1e-4, "{}", mean.mean);
+        let [low, high] = mean.interval95.unwrap();
+        assert!(-1.0 <= low && low < mean.mean && mean.mean < high && high <= 1.0);
+        assert!(Mean::of_correlations(&[1.0, 1.0]).unwrap().mean > 0.999);
+        assert!(Mean::of_correlations(&[]).is_none());
     }
 
     #[test]

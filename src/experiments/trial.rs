@@ -4,7 +4,8 @@ use crate::cell::measure;
 use crate::cell::measure::{Planned, plan};
 use crate::design::search::split;
 use crate::identification::identify;
-use crate::identification::outcome::{Errors, Identification};
+use crate::identification::outcome::{Errors, Identification, Residual};
+use crate::measurement::Role;
 use crate::recording::event::Nobody;
 use crate::scene::{Injected, Scene};
 use crate::seed::derive;
@@ -27,6 +28,8 @@ pub struct Calibrated {
     pub after: Errors,
     /// Errors of the nominal model on it.
     pub before: Errors,
+    /// Residuals of the verification, in the order in which the trial drew it.
+    pub verification: Vec<Residual>,
     /// All the rest.
     pub identification: Identification,
 }
@@ -58,10 +61,14 @@ impl<'a> Trial<'a> {
         let (measurements, _) = measure(&self.scene, self.injected, &planned, planned.len(), &mut Nobody)?;
         let identification = identify(&self.scene.arm, &self.scene.sensor, self.scene.weights, &measurements)?;
         let missing = || SessionError::NothingHeldOut;
+        let held_out = identification.residuals.iter().filter(|residual| planned[residual.index].role == Role::HeldOut);
+        let mut verification: Vec<Residual> = held_out.cloned().collect();
+        verification.sort_by_key(|residual| planned[residual.index].pose_id);
         Ok(Calibrated {
             converged: identification.converged,
             after: identification.held_out.clone().ok_or_else(missing)?,
             before: identification.held_out_nominal.clone().ok_or_else(missing)?,
+            verification,
             identification,
         })
     }

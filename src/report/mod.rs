@@ -1,6 +1,7 @@
 //! Results as tables and figures for people. Units are in the headers; machines get the same results as JSON.
 
 pub mod figure;
+pub mod findings;
 
 mod advice;
 pub mod criterion;
@@ -232,48 +233,4 @@ pub fn number(value: f64) -> String {
         let before = (libm::floor(libm::log10(size)) as i32 + 1).max(0);
         format!("{value:.*}", usize::try_from((4 - before).clamp(0, 6)).unwrap_or(0))
     }
-}
-
-/// Table 4 of the paper beside ours.
-#[must_use]
-pub fn count_error(rows: &[crate::experiments::count_error::Row]) -> String {
-    use crate::experiments::statistics::Mean;
-    let value = |mean: &Option<Mean>, factor: f64| mean.map_or_else(|| "–".to_owned(), |mean| number(mean.mean * factor));
-    let interval = |mean: &Option<Mean>, factor: f64| match mean.and_then(|mean| mean.interval95) {
-        Some([low, high]) => format!("{} … {}", number(low * factor), number(high * factor)),
-        None => "–".to_owned(),
-    };
-    let degrees = 180.0 / std::f64::consts::PI;
-    let cells = rows
-        .iter()
-        .map(|row| {
-            vec![
-                row.count.to_string(),
-                value(&row.nominal_position_m, 1e3),
-                number(row.paper_position_m * 1e3),
-                value(&row.position_m, 1e3),
-                interval(&row.position_m, 1e3),
-                number(row.paper_attitude_rad * degrees),
-                value(&row.attitude_rad, degrees),
-                interval(&row.attitude_rad, degrees),
-                format!("{}/{}", row.trials - row.not_converged, row.trials),
-            ]
-        })
-        .collect();
-    let header = [
-        "m",
-        "before (mm)",
-        "paper (mm)",
-        "ours (mm)",
-        "95 % of the mean",
-        "paper (°)",
-        "ours (°)",
-        "95 % of the mean",
-        "converged",
-    ];
-    format!(
-        "Held-out error against the number of configurations m (Chen et al. 2019, Table 4); random configurations,\n\
-         errors against exact poses (eq. 10) where the scene says held_out_exact.\n{}",
-        table(&header, cells)
-    )
 }

@@ -123,13 +123,3 @@ fn every_command_has_help_with_an_example() {
     assert!(kincal(folder.path(), &["--help"]).ends(0).stdout.contains("Exit codes: 0"));
     assert!(kincal(folder.path(), &["--version"]).ends(0).stdout.starts_with("kincal "));
 }
-
-#[test]
-fn an_experiment_is_shown_beside_its_published_numbers() {
-    let folder = tempfile::tempdir().unwrap();
-    let json = kincal(folder.path(), &["reproduce", "count-error", "--trials", "2", "--json"]).ends(0).json();
-    let rows = json["rows"].as_array().unwrap();
-    assert_eq!(rows.iter().map(|row| row["count"].as_u64().unwrap()).collect::<Vec<_>>(), [8, 20, 60, 200]);
-    assert!(number(&rows[3], "/position_m/mean") < number(&rows[0], "/position_m/mean"));
-    assert_eq!(names(folder.path()), Vec::<String>::new());
-}

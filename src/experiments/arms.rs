@@ -1,0 +1,59 @@
+//! The arms on which every claim is tried, and arms with narrower joints.
+
+use std::path::Path;
+
+use crate::arm::Arm;
+use crate::scene::{self, SceneError, SceneFile};
+
+/// Scenes of the arms, below the working directory: the substitute for the paper's, one with parallel axes, and one that exists.
+const SCENES: [&str; 3] = ["scenes/paper.toml", "scenes/parallel8.toml", "scenes/panda.toml"];
+
+/// The scenes of all arms that are there.
+///
+/// # Errors
+/// If one of them is no valid scene.
+pub fn arms() -> Result<Vec<SceneFile>, SceneError> {
+    SCENES.iter().map(Path::new).filter(|path| path.exists()).map(scene::read).collect()
+}
+
+/// `arm` with every joint's range cut to its middle ± `half_width` (rad or m), where it was wider.
+#[must_use]
+pub fn cut(arm: &Arm, half_width: f64) -> Arm {
+    with_half_widths(arm, |half| half.min(half_width))
+}
+
+/// `arm` with every joint's range narrowed about its middle by `factor`.
+#[must_use]
+pub fn narrowed(arm: &Arm, factor: f64) -> Arm {
+    with_half_widths(arm, |half| half * factor)
+}
+
+fn with_half_widths(arm: &Arm, change: impl Fn(f64) -> f64) -> Arm {
+    let mut arm = arm.clone();
+    for joint in &mut arm.chain.joints {
+        let (middle, half) = (0.5 * (joint.lower + joint.upper), 0.5 * (joint.upper - joint.lower));
+        let changed = change(half);
+        // Limits that stay are left as they are, to the last bit.
+        if changed < half {
+            (joint.lower, joint.upper) = (middle - changed, middle + changed);
+        }
+    }
+    arm
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_cut_about_their_middle() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml");
+        let arm = scene::read(&path).unwrap().scene.arm;
+        let limits = |arm: &Arm| arm.chain.joints.iter().map(|joint| (joint.lower, joint.upper)).collect::<Vec<_>>();
+        assert_eq!(limits(&cut(&arm, 4.0)), limits(&arm));
+        assert_eq!(limits(&narrowed(&arm, 1.0)), limits(&arm));
+        assert!(limits(&cut(&arm, 0.5)).iter().all(|limits| *limits == (-0.5, 0.5)));
+        let (first, half) = (limits(&arm)[0].1, limits(&narrowed(&arm, 0.5))[0].1);
+        assert!((half - 0.5 * first).abs() < 1e-15);
+    }
+}
