@@ -140,14 +140,14 @@ struct DesignForm {
     method: String,
     criterion: String,
     value: f64,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    advice: Option<Advice>,
     #[serde(with = "configurations")]
     configurations: Vec<Vec<f64>>,
     indexes: Indexes,
     indexes_all_parameters: Indexes,
     evenness_domains: EvennessDomains,
     random: RandomReference,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    advice: Option<Advice>,
     dropped_parameters: Vec<String>,
     evaluations: u64,
     rejections: u64,

@@ -136,7 +136,7 @@ fn a_changed_scene_is_found_or_refused() {
     let ran = with_scene("seed = 2019", "seed = 2020").ends(1);
     assert!(ran.stdout.starts_with("different: /design/swarm"), "{}", ran.stdout);
     let ran = with_scene("random_sets = 30", "random_sets = 29").ends(1);
-    assert!(ran.stdout.starts_with("different: /design/outcome[0].random."), "{}", ran.stdout);
+    assert!(ran.stdout.starts_with("different: /design/outcome[0].advice.random."), "{}", ran.stdout);
     let ran = with_scene("random_sets = 30", "random_sets = -1").ends(2);
     assert!(ran.stderr.contains("changed.mcap (scene)") && ran.stderr.contains("design.random_sets"), "{}", ran.stderr);
     with_scene("seed = 2019", "seed = 2019 # a comment").ends(0);
