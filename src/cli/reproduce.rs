@@ -86,7 +86,6 @@ fn scenes(global: &Global, paths: &[PathBuf]) -> anyhow::Result<Vec<(SceneFile, 
     } else {
         paths.iter().map(|path| Ok((scene::read(path)?, path.clone()))).collect::<anyhow::Result<_>>()?
     };
-    ensure!(!scenes.is_empty(), "no scene of an arm is found in scenes/: give one with --arm SCENE");
     for (file, path) in &mut scenes {
         if let Some(seed) = global.seed {
             file.set_seed(seed)?;

@@ -4,6 +4,8 @@
 //! rules, candidates whose sensitivity is larger than the mean are searched for from many starts (joint by joint) and added, until
 //! none is found; what the last search found goes into the gap, and the bound allows for the gap.
 
+use rayon::prelude::*;
+
 use super::approximate::{self, ApproximateDesign, ApproximateError, Settings};
 use super::candidates::{AlwaysColliding, Rules, RulesScratch, Sampler};
 use super::objective::Models;
@@ -12,13 +14,13 @@ use crate::scene::Criterion;
 use crate::seed::{Stream, stream};
 
 /// Searches for further candidates.
-const ROUNDS: usize = 5;
+const ROUNDS: usize = 4;
 /// Random starts of a search.
-const STARTS: usize = 64;
+const STARTS: usize = 32;
 /// Members of the design, those of largest weight, from which a search starts too.
-const MEMBERS: usize = 32;
+const MEMBERS: usize = 16;
 /// Passes over the joints in a search.
-const PASSES: usize = 3;
+const PASSES: usize = 2;
 /// Values that are tried of a joint.
 const LEVELS: usize = 8;
 /// Gap that is good enough.
@@ -113,29 +115,34 @@ fn climb(
     let sensitivities =
         |configurations: &[f64]| design.sensitivities(goal, &Blocks::of(&models.information, configurations, joints));
     let mut best = sensitivities(&here.concat());
-    let mut scratch = RulesScratch::default();
     for pass in 0..PASSES {
         for (joint, limits) in rules.arm().chain.joints.iter().enumerate() {
             let range = limits.upper - limits.lower;
-            let (mut trials, mut owners) = (Vec::new(), Vec::new());
-            for (owner, configuration) in here.iter().enumerate() {
-                let start = stream.unit();
-                for level in 0..LEVELS {
-                    let share = (level as f64 + start) / LEVELS as f64;
-                    let mut trial = configuration.clone();
-                    // The whole range first, then ever nearer to where it is.
-                    trial[joint] = if pass == 0 {
-                        limits.lower + range * share
-                    } else {
-                        let step = range * (share - 0.5) * 0.3 / pass as f64;
-                        (configuration[joint] + step).clamp(limits.lower, limits.upper)
-                    };
-                    if !rules.refuses(&trial, &mut scratch) {
-                        trials.extend_from_slice(&trial);
-                        owners.push(owner);
+            let starts: Vec<f64> = here.iter().map(|_| stream.unit()).collect();
+            let tried = here.par_iter().zip(starts).enumerate().map_init(
+                RulesScratch::default,
+                |scratch, (owner, (configuration, start))| {
+                    let mut tried = Vec::new();
+                    for level in 0..LEVELS {
+                        let share = (level as f64 + start) / LEVELS as f64;
+                        let mut trial = configuration.clone();
+                        // The whole range first, then ever nearer to where it is.
+                        trial[joint] = if pass == 0 {
+                            limits.lower + range * share
+                        } else {
+                            let step = range * (share - 0.5) * 0.3 / pass as f64;
+                            (configuration[joint] + step).clamp(limits.lower, limits.upper)
+                        };
+                        if !rules.refuses(&trial, scratch) {
+                            tried.push((owner, trial));
+                        }
                     }
-                }
-            }
+                    tried
+                },
+            );
+            let tried: Vec<(usize, Vec<f64>)> = tried.collect::<Vec<_>>().concat();
+            let (owners, trials): (Vec<usize>, Vec<Vec<f64>>) = tried.into_iter().unzip();
+            let trials = trials.concat();
             for ((sensitivity, trial), owner) in sensitivities(&trials).into_iter().zip(trials.chunks_exact(joints)).zip(owners) {
                 if sensitivity > best[owner] {
                     best[owner] = sensitivity;

@@ -53,6 +53,15 @@ pub fn search(task: &Task<'_>, stream: &mut Stream, watch: &mut Watch<'_>) -> Re
 /// Told members, value, and whether it is the last set.
 pub(super) type Tell<'t> = dyn FnMut(&[usize], f64, bool) -> Result<(), SearchError> + 't;
 
+/// One search from `members` of `pool` (configurations one after the other, rad or m): the members of a set that no excursion makes
+/// better, and its value. It goes on as long as the task's budget.
+#[must_use]
+pub fn detmax(task: &Task<'_>, pool: &[f64], members: Vec<usize>) -> (Vec<usize>, f64) {
+    let nothing = (Vec::new(), f64::NEG_INFINITY);
+    // It fails only where somebody watches.
+    climb(task, pool, members, &mut |_, _, _| Ok(())).unwrap_or(nothing)
+}
+
 /// One search: from `members` to a set that no excursion makes better. `tell` gets members and value of every better set, and the
 /// last.
 pub(super) fn climb(

@@ -18,6 +18,9 @@ const WORKSPACE_POINTS: usize = 500;
 /// parameters has a value too (a poor one), and a search finds its way out.
 const RIDGE: f64 = 1e-9;
 
+/// Changes of a set after which its Gram matrix is summed anew, so that rounding does not pile up.
+const RESUM: usize = 64;
+
 /// The models behind all criteria, for one arm and sensor.
 pub struct Models {
     /// O1–O6, dispersion, evenness and O_C.
@@ -237,13 +240,16 @@ pub struct Set<'a> {
     rows: Vec<f64>,
     end_points: Vec<Vector3<f64>>,
     gram: Vec<f64>,
+    /// Changes since the Gram matrix was summed.
+    changes: usize,
 }
 
 impl<'a> Set<'a> {
     /// The set of `configurations`, one after the other (rad or m).
     #[must_use]
     pub fn new(objective: &'a Objective<'a>, configurations: Vec<f64>, scratch: &mut ObjectiveScratch) -> Self {
-        let mut set = Set { objective, configurations: Vec::new(), rows: Vec::new(), end_points: Vec::new(), gram: Vec::new() };
+        let mut set =
+            Set { objective, configurations: Vec::new(), rows: Vec::new(), end_points: Vec::new(), gram: Vec::new(), changes: 0 };
         for joints in configurations.chunks_exact(objective.joint_count) {
             let start = set.rows.len();
             set.rows.resize(start + objective.row_size(), 0.0);
@@ -332,8 +338,10 @@ impl<'a> Set<'a> {
     pub fn replace(&mut self, index: usize, joints: &[f64], scratch: &mut ObjectiveScratch) {
         let (size, count) = (self.objective.row_size(), self.objective.joint_count);
         self.configurations[index * count..(index + 1) * count].copy_from_slice(joints);
+        self.add(index, -1.0);
         self.end_points[index] = self.objective.contribution(joints, scratch, &mut self.rows[index * size..(index + 1) * size]);
-        self.sum();
+        self.add(index, 1.0);
+        self.changed();
     }
 
     /// Adds `joints` as the last configuration.
@@ -343,20 +351,36 @@ impl<'a> Set<'a> {
         self.configurations.extend_from_slice(joints);
         let end_point = self.objective.contribution(joints, scratch, &mut self.rows[start..]);
         self.end_points.push(end_point);
-        self.sum();
+        self.add(self.len() - 1, 1.0);
+        self.changed();
     }
 
     /// Takes configuration `index` out; those behind it move up.
     pub fn remove(&mut self, index: usize) {
         let (size, count) = (self.objective.row_size(), self.objective.joint_count);
+        self.add(index, -1.0);
         self.configurations.drain(index * count..(index + 1) * count);
         self.rows.drain(index * size..(index + 1) * size);
         self.end_points.remove(index);
-        self.sum();
+        self.changed();
     }
 
-    /// Sums the Gram matrix anew: rounding does not pile up over changes.
+    /// Adds what configuration `index` contributes to the Gram matrix, or takes it (`factor` −1).
+    fn add(&mut self, index: usize, factor: f64) {
+        let (columns, size) = (self.objective.columns(), self.objective.row_size());
+        dense::add_gram(&self.rows[index * size..(index + 1) * size], factor, columns, &mut self.gram);
+    }
+
+    fn changed(&mut self) {
+        self.changes += 1;
+        if self.changes >= RESUM {
+            self.sum();
+        }
+    }
+
+    /// Sums the Gram matrix anew.
     fn sum(&mut self) {
+        self.changes = 0;
         let (columns, size) = (self.objective.columns(), self.objective.row_size());
         self.gram.clear();
         self.gram.resize(columns * columns, 0.0);

@@ -1,19 +1,25 @@
 //! The arms on which every claim is tried, and arms with narrower joints.
 
-use std::path::Path;
-
 use crate::arm::Arm;
 use crate::scene::{self, SceneError, SceneFile};
 
-/// Scenes of the arms, below the working directory: the substitute for the paper's, one with parallel axes, and one that exists.
-const SCENES: [&str; 3] = ["scenes/paper.toml", "scenes/parallel8.toml", "scenes/panda.toml"];
+/// Scenes of the arms: the substitute for the paper's, one with parallel axes, and one that exists. They are part of the program,
+/// which may stand anywhere.
+const SCENES: [(&str, &str); 3] = [
+    ("scenes/paper.toml", include_str!("../../scenes/paper.toml")),
+    ("scenes/parallel8.toml", include_str!("../../scenes/parallel8.toml")),
+    ("scenes/panda.toml", include_str!("../../scenes/panda.toml")),
+];
+/// What one of them takes from another file.
+const URDF: (&str, &str) = ("urdf_file = \"panda.urdf\"", include_str!("../../scenes/panda.urdf"));
 
-/// The scenes of all arms that are there.
+/// The scenes of all arms.
 ///
 /// # Errors
 /// If one of them is no valid scene.
 pub fn arms() -> Result<Vec<SceneFile>, SceneError> {
-    SCENES.iter().map(Path::new).filter(|path| path.exists()).map(scene::read).collect()
+    let (key, urdf) = URDF;
+    SCENES.iter().map(|(name, text)| scene::parse(&text.replace(key, &format!("urdf = '''\n{urdf}'''")), name)).collect()
 }
 
 /// `arm` with every joint's range cut to its middle ± `half_width` (rad or m), where it was wider.
@@ -43,7 +49,17 @@ fn with_half_widths(arm: &Arm, change: impl Fn(f64) -> f64) -> Arm {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
+
+    #[test]
+    fn the_arms_of_the_program_are_those_of_the_files() {
+        for (file, (name, _)) in arms().unwrap().iter().zip(SCENES) {
+            let read = scene::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
+            assert_eq!((&file.scene, &file.injected), (&read.scene, &read.injected));
+        }
+    }
 
     #[test]
     fn ranges_are_cut_about_their_middle() {

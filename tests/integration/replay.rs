@@ -48,10 +48,9 @@ fn every_method_is_recorded_and_replays_bit_for_bit() {
             assert!(last["evaluations"].as_u64() <= design["evaluations"].as_u64(), "{method}");
         }
         assert_eq!((&design["method"], &design["criterion"]), (&method.into(), &"comprehensive".into()));
-        for more in [&[][..], &["--truth", &one.text("arm8.truth.toml"), "--threads", "1"]] {
-            let json = replay(&one, "arm8.mcap", &[more, &["--json"]].concat()).ends(0).json();
-            assert_eq!((&json["identical"], &json["messages_compared"]), (&true.into(), &messages.len().into()), "{method}");
-        }
+        let truth = one.text("arm8.truth.toml");
+        let json = replay(&one, "arm8.mcap", &["--truth", &truth, "--threads", "1", "--json"]).ends(0).json();
+        assert_eq!((&json["identical"], &json["messages_compared"]), (&true.into(), &messages.len().into()), "{method}");
     }
 }
 
