@@ -8,6 +8,7 @@ pub mod cell;
 pub mod cli;
 pub mod design;
 pub mod experiments;
+pub mod figure;
 pub mod frames;
 pub mod identification;
 pub mod kinematics;

@@ -3,7 +3,7 @@
 use crate::arm::Arm;
 use crate::cell::measure::{MeasureError, plan};
 use crate::cell::{Truth, measure};
-use crate::design::candidates::AlwaysColliding;
+use crate::design::candidates::NothingMeasurable;
 use crate::design::outcome::DesignOutcome;
 use crate::design::{self, DesignError};
 use crate::identification::alignment::{AlignmentError, align};
@@ -22,7 +22,7 @@ pub enum SessionError {
     Design(#[from] DesignError),
     /// Drawing held-out configurations.
     #[error(transparent)]
-    HeldOut(#[from] AlwaysColliding),
+    HeldOut(#[from] NothingMeasurable),
     /// Measuring.
     #[error(transparent)]
     Measure(#[from] MeasureError),

@@ -1,22 +1,34 @@
 //! What choosing is worth for this arm and situation, told before anything is measured.
 
-use super::bound::bound;
+use super::bound::{BoundError, bound};
 use super::candidates::Rules;
 use super::objective::Models;
 use super::outcome::Advice;
 use crate::quality::prediction::Prediction;
 use crate::scene::{Criterion, Scene};
 
+/// Least number of candidates of the bound.
+const LEAST_POOL: usize = 500;
+
 /// Predicts what noise will leave after a calibration with `chosen`, with each of the sets `random`, and with the best set that
-/// there can be. `None` where no configurations determine the parameters.
-#[must_use]
-pub fn advise(scene: &Scene, models: &Models, rules: &Rules<'_>, chosen: &[f64], random: &[Vec<f64>]) -> Option<Advice> {
+/// there can be.
+///
+/// # Errors
+/// If there is no bound.
+pub fn advise(
+    scene: &Scene,
+    models: &Models,
+    rules: &Rules<'_>,
+    chosen: &[f64],
+    random: &[Vec<f64>],
+) -> Result<Advice, BoundError> {
     let joints = scene.arm.joint_count();
-    let bound = bound(models, rules, Criterion::IOptimality, scene.design.pool).ok()?;
+    // A small pool is the search's affair.
+    let bound = bound(models, rules, Criterion::IOptimality, scene.design.pool.max(LEAST_POOL))?;
     let predicted: Vec<Prediction> = random.iter().filter_map(|set| models.predict(set, joints)).collect();
     let mean = |of: fn(&Prediction) -> f64| predicted.iter().map(of).sum::<f64>() / predicted.len() as f64;
     let errors = || predicted.iter().map(|prediction| prediction.position_rms_m);
-    Some(Advice {
+    Ok(Advice {
         chosen: models.predict(chosen, joints),
         random: (!predicted.is_empty()).then(|| Prediction {
             position_rms_m: mean(|prediction| prediction.position_rms_m),

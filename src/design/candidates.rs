@@ -62,16 +62,33 @@ pub struct Sampler<'a> {
 
 /// No configuration that may be measured was found.
 #[derive(Debug, thiserror::Error)]
-#[error(
-    "none of {draws} random configurations is free of collisions; most often {} touches {} ({share:.0} % of the draws). \
-     Check link shapes and fixtures, list the pair under `uncollidable` or the link under the fixture's `may_touch` if they are \
-     meant to touch, or widen the joint limits",
-    .contact.first, .contact.second
-)]
-pub struct AlwaysColliding {
-    draws: usize,
-    contact: Contact,
-    share: f64,
+pub enum NothingMeasurable {
+    /// The arm touches something.
+    #[error(
+        "none of {draws} random configurations is free of collisions; most often {} touches {} ({share:.0} % of the draws). \
+         Check link shapes and fixtures, list the pair under `uncollidable` or the link under the fixture's `may_touch` if they are \
+         meant to touch, or widen the joint limits",
+        .contact.first, .contact.second
+    )]
+    Colliding {
+        /// Configurations drawn.
+        draws: usize,
+        /// The pair that touches most often.
+        contact: Contact,
+        /// How often, in percent.
+        share: f64,
+    },
+    /// The sensor does not see the end point.
+    #[error(
+        "of {draws} random configurations none is both free of collisions and seen by the sensor: {share:.0} % of the draws have their \
+         end point outside its view. Check sensor.view (towards_mm, half_angle_deg) and sensor.position_mm"
+    )]
+    Hidden {
+        /// Configurations drawn.
+        draws: usize,
+        /// Share whose end point is not seen, in percent.
+        share: f64,
+    },
 }
 
 impl<'a> Sampler<'a> {
@@ -85,7 +102,7 @@ impl<'a> Sampler<'a> {
     ///
     /// # Errors
     /// If every draw is refused.
-    pub fn draw_into(&mut self, stream: &mut Stream, out: &mut Vec<f64>) -> Result<(), AlwaysColliding> {
+    pub fn draw_into(&mut self, stream: &mut Stream, out: &mut Vec<f64>) -> Result<(), NothingMeasurable> {
         let start = out.len();
         for _ in 0..DRAWS {
             out.truncate(start);
@@ -103,7 +120,7 @@ impl<'a> Sampler<'a> {
     ///
     /// # Errors
     /// If every draw is refused.
-    pub fn draw(&mut self, stream: &mut Stream, count: usize) -> Result<Vec<f64>, AlwaysColliding> {
+    pub fn draw(&mut self, stream: &mut Stream, count: usize) -> Result<Vec<f64>, NothingMeasurable> {
         let mut configurations = Vec::with_capacity(count * self.rules.arm.joint_count());
         for _ in 0..count {
             self.draw_into(stream, &mut configurations)?;
@@ -111,13 +128,15 @@ impl<'a> Sampler<'a> {
         Ok(configurations)
     }
 
-    fn explain(&self, stream: &mut Stream) -> AlwaysColliding {
+    fn explain(&self, stream: &mut Stream) -> NothingMeasurable {
         let mut contacts: Vec<(Contact, usize)> = Vec::new();
-        let samples = 1000;
+        let (samples, mut hidden, mut colliding) = (1000, 0, 0);
         for _ in 0..samples {
             let joints: Vec<f64> =
                 self.rules.arm.chain.joints.iter().map(|joint| stream.uniform(joint.lower, joint.upper)).collect();
+            hidden += u32::from(self.rules.hidden(&joints));
             if let Some(contact) = self.rules.check.contact(&joints) {
+                colliding += 1;
                 match contacts.iter_mut().find(|(known, _)| *known == contact) {
                     Some((_, count)) => *count += 1,
                     None => contacts.push((contact, 1)),
@@ -128,6 +147,10 @@ impl<'a> Sampler<'a> {
             .into_iter()
             .max_by_key(|(_, count)| *count)
             .unwrap_or((Contact { first: "a link".into(), second: "another".into() }, 0));
-        AlwaysColliding { draws: DRAWS, contact, share: 100.0 * count as f64 / f64::from(samples) }
+        let share = |count: f64| 100.0 * count / f64::from(samples);
+        if hidden > colliding {
+            return NothingMeasurable::Hidden { draws: DRAWS, share: share(f64::from(hidden)) };
+        }
+        NothingMeasurable::Colliding { draws: DRAWS, contact, share: share(count as f64) }
     }
 }

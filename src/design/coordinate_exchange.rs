@@ -69,6 +69,9 @@ pub(super) fn improve(
     for (joint, limits) in task.arm().chain.joints.iter().enumerate() {
         let here = set.get(index).to_vec();
         let range = limits.upper - limits.lower;
+        if range <= 0.0 {
+            continue;
+        }
         let start = stream.unit();
         let step = nearby * range * stream.unit();
         let spread = (0..SPREAD).map(|point| limits.lower + range * ((point as f64 + start) / SPREAD as f64));
@@ -81,6 +84,7 @@ pub(super) fn improve(
                 trial
             })
             .filter(|trial| !task.refuses(trial, scratch))
+            .take(usize::try_from(task.left()).unwrap_or(usize::MAX))
             .collect();
         let values: Vec<f64> = trials
             .par_iter()

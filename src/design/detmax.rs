@@ -15,8 +15,10 @@ use crate::seed::Stream;
 
 /// How many members more or less than m an excursion may have.
 const EXCURSION: usize = 6;
-/// A gain smaller than this is rounding.
-const ROUNDING: f64 = 1e-10;
+/// A gain smaller than this is nothing, or rounding where the information is nearly singular.
+const NOTHING: f64 = 1e-6;
+/// Excursions of one search, per member: where rounding feigns gains, it ends all the same.
+const MOST_EXCURSIONS: usize = 50;
 
 /// Searches from random members of a random pool, again and again while the budget lasts.
 ///
@@ -71,13 +73,17 @@ pub(super) fn climb(
     tell: &mut Tell<'_>,
 ) -> Result<(Vec<usize>, f64), SearchError> {
     let count = members.len();
-    let mut set = PoolSet::new(task, pool, members.clone());
-    let (mut best, mut value) = (members, set.value());
-    tell(&best, value, false)?;
+    let candidates = (pool.len() / task.arm().joint_count()) as u64;
+    let mut home = PoolSet::new(task, pool, members);
+    let mut set = home.clone();
+    tell(home.members(), home.value(), false)?;
     let mut failed: BTreeSet<Vec<usize>> = BTreeSet::new();
     let mut up = true;
-    let mut gave_up = 0;
-    while gave_up < 2 && task.left() > 0 {
+    // Whether an excursion down, and one up, has left the sizes since the last improvement.
+    let mut gave_up = [false; 2];
+    let mut excursions = 0;
+    while !(gave_up[0] && gave_up[1]) && task.left() > 0 && excursions < MOST_EXCURSIONS * count {
+        excursions += 1;
         let mut visited = Vec::new();
         let mut first = true;
         let returned = loop {
@@ -92,7 +98,10 @@ pub(super) fn climb(
                 (size < count) != known
             };
             first = false;
-            if (add && size >= count + EXCURSION) || (!add && (size + EXCURSION <= count || size <= 1)) || task.left() == 0 {
+            if (add && size >= count + EXCURSION)
+                || (!add && (size + EXCURSION <= count || size <= 1))
+                || task.left() < if add { candidates } else { size as u64 }
+            {
                 break false;
             }
             if add {
@@ -104,21 +113,18 @@ pub(super) fn climb(
                 break true;
             }
         };
-        if returned && set.value() > value + ROUNDING {
-            value = set.value();
-            best = set.members().to_vec();
+        if returned && set.value() > home.value() + NOTHING {
+            home.clone_from(&set);
             failed.clear();
-            gave_up = 0;
-            tell(&best, value, false)?;
+            gave_up = [false; 2];
+            tell(home.members(), home.value(), false)?;
         } else {
             failed.extend(visited);
-            if !returned {
-                gave_up += 1;
-            }
-            set = PoolSet::new(task, pool, best.clone());
+            gave_up[usize::from(up)] |= !returned;
+            set.clone_from(&home);
             up = !up;
         }
     }
-    tell(&best, value, true)?;
-    Ok((best, value))
+    tell(home.members(), home.value(), true)?;
+    Ok((home.members().to_vec(), home.value()))
 }

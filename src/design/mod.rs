@@ -29,7 +29,7 @@ use crate::quality::globality::WorkspaceGrid;
 use crate::recording::event::{Event, Listener, ListenerError};
 use crate::scene::{EvennessDomain, Method, Scene};
 use crate::seed::stream;
-use candidates::{AlwaysColliding, Rules, Sampler};
+use candidates::{NothingMeasurable, Rules, Sampler};
 use objective::{Models, Objective};
 use outcome::{DesignOutcome, EvennessDomains, RandomReference};
 use search::{SearchError, Task, Told, finite, search, split};
@@ -39,7 +39,7 @@ use search::{SearchError, Task, Told, finite, search, split};
 pub enum DesignError {
     /// No configuration may be measured.
     #[error(transparent)]
-    AlwaysColliding(#[from] AlwaysColliding),
+    NothingMeasurable(#[from] NothingMeasurable),
     /// Whoever records or shows the run failed.
     #[error(transparent)]
     Listener(#[from] ListenerError),
@@ -48,7 +48,7 @@ pub enum DesignError {
 impl From<SearchError> for DesignError {
     fn from(error: SearchError) -> Self {
         match error {
-            SearchError::AlwaysColliding(error) => error.into(),
+            SearchError::NothingMeasurable(error) => error.into(),
             SearchError::Watcher(error) => error.into(),
         }
     }
@@ -92,6 +92,7 @@ pub fn design(scene: &Scene, listener: &mut dyn Listener) -> Result<DesignOutcom
             WorkspaceGrid::new(arm, domain, problem.evenness_step_m).evenness(end_points)
         }
     };
+    let advice = advice::advise(scene, &models, &rules, &found.configurations, &random_sets);
     let outcome = DesignOutcome {
         method: problem.method.name().to_owned(),
         criterion: problem.criterion.name().to_owned(),
@@ -104,7 +105,8 @@ pub fn design(scene: &Scene, listener: &mut dyn Listener) -> Result<DesignOutcom
             bounding_cube: evenness_in(EvennessDomain::BoundingCube),
         },
         random,
-        advice: advice::advise(scene, &models, &rules, &found.configurations, &random_sets),
+        no_advice: advice.as_ref().err().map(ToString::to_string),
+        advice: advice.ok(),
         dropped_parameters: evaluator.subspace().dropped.iter().map(|&c| arm.chain.parameters[c].name.clone()).collect(),
         evaluations: task.evaluations(),
         rejections: task.rejections(),
@@ -118,7 +120,7 @@ pub fn design(scene: &Scene, listener: &mut dyn Listener) -> Result<DesignOutcom
 ///
 /// # Errors
 /// If no configuration is free of collisions.
-pub fn held_out(scene: &Scene) -> Result<Vec<Vec<f64>>, AlwaysColliding> {
+pub fn held_out(scene: &Scene) -> Result<Vec<Vec<f64>>, NothingMeasurable> {
     // An exact reference sees everything; a sensor's readings must be within its view.
     let rules =
         if scene.plan.held_out_exact { Rules::reachable(&scene.arm) } else { Rules::measurable(&scene.arm, &scene.sensor) };
@@ -126,7 +128,7 @@ pub fn held_out(scene: &Scene) -> Result<Vec<Vec<f64>>, AlwaysColliding> {
     Ok(split(&drawn, scene.arm.joint_count()))
 }
 
-fn random_sets(scene: &Scene, rules: &Rules<'_>) -> Result<Vec<Vec<f64>>, AlwaysColliding> {
+fn random_sets(scene: &Scene, rules: &Rules<'_>) -> Result<Vec<Vec<f64>>, NothingMeasurable> {
     let mut sampler = Sampler::new(rules);
     (0..scene.design.random_sets)
         .map(|set| sampler.draw(&mut stream(scene.seed, &format!("design/random/{set}")), scene.design.count))

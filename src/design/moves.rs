@@ -1,7 +1,7 @@
 //! What the methods that move configurations share: small and large moves that keep to the limits and the rules, and the record of
 //! the best set.
 
-use super::candidates::AlwaysColliding;
+use super::candidates::NothingMeasurable;
 use super::outcome::StopReason;
 use super::search::{Found, Scratch, SearchError, Task, Watch};
 use crate::seed::Stream;
@@ -104,7 +104,7 @@ pub(super) fn near(
 ///
 /// # Errors
 /// If none is.
-pub(super) fn fresh(task: &Task<'_>, stream: &mut Stream, out: &mut Vec<f64>) -> Result<(), AlwaysColliding> {
+pub(super) fn fresh(task: &Task<'_>, stream: &mut Stream, out: &mut Vec<f64>) -> Result<(), NothingMeasurable> {
     *out = task.draw(stream, 1)?;
     Ok(())
 }

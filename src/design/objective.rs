@@ -2,11 +2,11 @@
 
 use nalgebra::Vector3;
 
-use super::candidates::{AlwaysColliding, Rules, Sampler};
+use super::candidates::{NothingMeasurable, Rules, Sampler};
 use crate::quality::dense;
 use crate::quality::evaluator::{Evaluator, comprehensive};
 use crate::quality::globality::dispersion;
-use crate::quality::information::{Blocks, InformationModel, JacobianScratch};
+use crate::quality::information::{InformationModel, JacobianScratch};
 use crate::quality::observability::observability;
 use crate::quality::prediction::{Prediction, PredictionWorkspace};
 use crate::scene::{Criterion, Scene};
@@ -38,7 +38,7 @@ impl Models {
     ///
     /// # Errors
     /// If every configuration collides.
-    pub fn new(scene: &Scene) -> Result<Self, AlwaysColliding> {
+    pub fn new(scene: &Scene) -> Result<Self, NothingMeasurable> {
         let (arm, problem) = (&scene.arm, &scene.design);
         let attitude = scene.sensor.attitude_sigma_rad.is_some();
         let evaluator = Evaluator::new(arm, attitude, problem.evenness_domain, problem.evenness_step_m, problem.jacobian_scaling);
@@ -67,10 +67,20 @@ impl Models {
     #[must_use]
     pub fn predict(&self, configurations: &[f64], joint_count: usize) -> Option<Prediction> {
         let rank = self.information.rank();
-        let blocks = Blocks::of(&self.information, configurations, joint_count);
-        let mut information = vec![0.0; rank * rank];
-        blocks.iter().for_each(|block| dense::add_gram(block, 1.0, rank, &mut information));
-        self.workspace.predict(&information)
+        let (mut information, mut noise) = (vec![0.0; rank * rank], vec![0.0; rank * rank]);
+        let mut block = vec![0.0; rank * self.information.rows_per_pose()];
+        let mut scratch = JacobianScratch::default();
+        for joints in configurations.chunks_exact(joint_count) {
+            let end_point = self.information.block_into(joints, &mut scratch, &mut block);
+            dense::add_gram(&block, 1.0, rank, &mut information);
+            self.information.noise_into(&end_point, &mut block);
+            dense::add_gram(&block, 1.0, rank, &mut noise);
+        }
+        if self.information.as_declared() {
+            self.workspace.predict(&information)
+        } else {
+            self.workspace.predict_with(&information, &noise)
+        }
     }
 
     /// Adds the ridge to an information matrix (row-major).

@@ -28,7 +28,7 @@ pub struct SwarmIteration {
     pub c2: f64,
     /// Evaluations of the fitness so far.
     pub evaluations: u64,
-    /// Configurations refused so far because they collide.
+    /// Configurations refused so far, because they collide or the sensor does not see them.
     pub rejections: u64,
     /// End points of every particle's configurations in base, m: particle by particle. Recorded as a point cloud.
     #[serde(skip)]
@@ -77,8 +77,6 @@ pub enum StopReason {
     Drawn,
     /// All values of the criterion that it may compute are computed.
     BudgetSpent,
-    /// No change that it tries makes the set better.
-    LocalOptimum,
 }
 
 /// Mean, smallest and largest value of each index over random sets of the same size: what choosing is compared with.
@@ -115,6 +113,9 @@ pub struct DesignOutcome {
     pub random: RandomReference,
     /// What choosing is worth; absent where it cannot be told.
     pub advice: Option<Advice>,
+    /// Why it cannot be told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub no_advice: Option<String>,
     /// Names of parameters that the others can stand in for and that are therefore held at their nominal values.
     pub dropped_parameters: Vec<String>,
     /// Values of the criterion that were computed.
@@ -140,7 +141,8 @@ pub struct Advice {
     pub random_range_m: [f64; 2],
     /// Random sets that do not determine the parameters.
     pub random_undetermined: usize,
-    /// No set of as many of the candidates leaves less than this, m: from the optimal approximate design.
+    /// No set of as many of the candidates leaves less than this, m: from the optimal approximate design. For configurations that
+    /// are no candidates it is as good as a search for better ones.
     pub bound_m: f64,
     /// What is left between that design and its dual, as a share: the bound already allows for it.
     pub bound_gap: f64,

@@ -6,10 +6,12 @@
 //! tr((I − V)⁻¹ W), where W = X M⁻¹ L M⁻¹ Xᵀ. V and W of all candidates are brought up to date by a change of low rank (Woodbury)
 //! rather than computed anew: that is what makes exchange methods fast. Other criteria are valued set by set.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
-use super::objective::Set;
-use super::search::{Scratch, Task};
+use super::objective::{ObjectiveScratch, Set};
+use super::search::Task;
 use crate::quality::dense;
 use crate::quality::information::Blocks;
 use crate::scene::Criterion;
@@ -20,6 +22,7 @@ const REFRESH: usize = 64;
 const CHUNK: usize = 64;
 
 /// A set of members of a pool.
+#[derive(Clone)]
 pub(super) enum PoolSet<'a> {
     /// By formula.
     Fast(Box<FastSet<'a>>),
@@ -28,19 +31,21 @@ pub(super) enum PoolSet<'a> {
 }
 
 /// A set of a pool, valued set by set.
+#[derive(Clone)]
 pub(super) struct PlainSet<'a> {
     task: &'a Task<'a>,
     pool: &'a [f64],
     members: Vec<usize>,
     set: Set<'a>,
     value: f64,
-    scratch: Scratch,
+    scratch: ObjectiveScratch,
 }
 
 /// A set of a pool, valued by formula.
+#[derive(Clone)]
 pub(super) struct FastSet<'a> {
     task: &'a Task<'a>,
-    blocks: Blocks,
+    blocks: Arc<Blocks>,
     /// L of the mean variance; none for the determinant.
     weight: Option<&'a [f64]>,
     members: Vec<usize>,
@@ -118,10 +123,10 @@ impl<'a> PlainSet<'a> {
     fn new(task: &'a Task<'a>, pool: &'a [f64], members: Vec<usize>) -> Self {
         let joints = task.arm().joint_count();
         let configurations = members.iter().flat_map(|member| &pool[member * joints..(member + 1) * joints]).copied().collect();
-        let mut scratch = Scratch::default();
-        let set = Set::new(task.objective, configurations, &mut scratch.objective);
+        let mut scratch = ObjectiveScratch::default();
+        let set = Set::new(task.objective, configurations, &mut scratch);
         task.spend(1);
-        let value = set.value(&mut scratch.objective);
+        let value = set.value(&mut scratch);
         PlainSet { task, pool, members, set, value, scratch }
     }
 
@@ -136,11 +141,11 @@ impl<'a> PlainSet<'a> {
         let values: Vec<f64> = (0..count)
             .into_par_iter()
             .with_min_len(CHUNK / 8)
-            .map_init(Scratch::default, |scratch, index| self.set.value_plus(self.candidate(index), &mut scratch.objective))
+            .map_init(ObjectiveScratch::default, |scratch, index| self.set.value_plus(self.candidate(index), scratch))
             .collect();
         let best = largest(&values);
         let joints = self.candidate(best);
-        self.set.push(joints, &mut self.scratch.objective);
+        self.set.push(joints, &mut self.scratch);
         self.members.push(best);
         self.value = values[best];
     }
@@ -149,7 +154,7 @@ impl<'a> PlainSet<'a> {
         self.task.spend(self.members.len() as u64);
         let values: Vec<f64> = (0..self.members.len())
             .into_par_iter()
-            .map_init(Scratch::default, |scratch, index| self.set.value_without(index, &mut scratch.objective))
+            .map_init(ObjectiveScratch::default, |scratch, index| self.set.value_without(index, scratch))
             .collect();
         let worst = largest(&values);
         self.set.remove(worst);
@@ -161,7 +166,7 @@ impl<'a> PlainSet<'a> {
 impl<'a> FastSet<'a> {
     fn new(task: &'a Task<'a>, pool: &[f64], weight: Option<&'a [f64]>, members: Vec<usize>) -> Self {
         let models = task.objective.models();
-        let blocks = Blocks::of(&models.information, pool, task.arm().joint_count());
+        let blocks = Arc::new(Blocks::of(&models.information, pool, task.arm().joint_count()));
         let rank = blocks.rank();
         let mut information = vec![0.0; rank * rank];
         models.add_ridge(&mut information);
@@ -255,7 +260,8 @@ impl<'a> FastSet<'a> {
     fn change(&mut self, candidate: usize, sign: f64) {
         let (rank, rows) = (self.blocks.rank(), self.blocks.rows_per_pose());
         let size = rows * rows;
-        let block = self.blocks.get(candidate);
+        let blocks = Arc::clone(&self.blocks);
+        let block = blocks.get(candidate);
         if sign > 0.0 {
             self.members.push(candidate);
         }

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
-use super::candidates::{AlwaysColliding, Rules, RulesScratch, Sampler};
+use super::candidates::{NothingMeasurable, Rules, RulesScratch, Sampler};
 use super::objective::{Objective, ObjectiveScratch, Set};
 use super::outcome::{SearchStep, StopReason, SwarmIteration};
 use crate::arm::Arm;
@@ -37,7 +37,7 @@ pub struct Task<'a> {
 pub enum SearchError {
     /// No configuration may be measured.
     #[error(transparent)]
-    AlwaysColliding(#[from] AlwaysColliding),
+    NothingMeasurable(#[from] NothingMeasurable),
     /// Whoever watches refused a step.
     #[error(transparent)]
     Watcher(#[from] ListenerError),
@@ -125,7 +125,7 @@ impl<'a> Task<'a> {
     ///
     /// # Errors
     /// If none is.
-    pub fn draw(&self, stream: &mut Stream, count: usize) -> Result<Vec<f64>, AlwaysColliding> {
+    pub fn draw(&self, stream: &mut Stream, count: usize) -> Result<Vec<f64>, NothingMeasurable> {
         let mut sampler = Sampler::new(self.rules);
         let drawn = sampler.draw(stream, count);
         self.rejections.fetch_add(sampler.rejections, Ordering::Relaxed);

@@ -7,15 +7,16 @@
 use rayon::prelude::*;
 
 use super::Experiment;
+use super::arms::cut;
 use super::bench::Bench;
 use super::findings::{Claim, Data, Findings, Tally};
-use super::situation::{Reach, Sees, Situation, limit};
+use super::situation::{Reach, Sees, Situation};
 use super::statistics::{Mean, rank_correlation};
 use super::trial::Trial;
 use crate::design::candidates::{Rules, Sampler};
 use crate::design::design;
+use crate::figure::{Axis, Colour, Estimate, Figure, Kind, Panel, Series};
 use crate::recording::event::Nobody;
-use crate::report::figure::{Axis, Colour, Estimate, Figure, Kind, Panel, Series};
 use crate::scene::{Criterion, Method, Scene};
 use crate::seed::stream;
 use crate::session::SessionError;
@@ -53,32 +54,39 @@ struct Outcome {
 fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
     let cells = cells(bench.scene);
     bench.watcher.begin("advice", cells.len() * (trials + 1));
-    let mut outcomes = Vec::new();
+    let (mut outcomes, mut skipped) = (Vec::new(), Vec::new());
     for (label, scene, situation) in cells {
         let chosen = design(&scene, &mut Nobody);
         bench.watcher.step();
-        // Too few configurations for this arm.
-        let Some(advice) = chosen.as_ref().ok().and_then(|outcome| outcome.advice) else { continue };
-        let (Ok(outcome), Some(set), Some(random)) = (chosen, advice.chosen, advice.random) else { continue };
+        let outcome = chosen?;
+        let told = outcome.advice.and_then(|advice| Some((advice, advice.chosen?, advice.random?)));
+        // Too few configurations for this arm, most likely.
+        let Some((advice, set, random)) = told else {
+            let why = outcome.no_advice.unwrap_or_else(|| "so few configurations do not determine the parameters".to_owned());
+            skipped.push(format!("{label}: left out, {why}."));
+            (0..trials).for_each(|_| bench.watcher.step());
+            continue;
+        };
         let chosen = outcome.configurations.concat();
         let rules = Rules::measurable(&scene.arm, &scene.sensor);
         let injected = situation.injected(bench.scene);
-        let errors: Vec<[Option<f64>; 2]> = (0..trials)
+        let rank = outcome.indexes.rank;
+        let fits: Vec<[(Option<f64>, bool); 2]> = (0..trials)
             .into_par_iter()
             .map(|number| {
                 let trial = Trial::new(&scene, &injected, number)?;
                 let drawn = Sampler::new(&rules).draw(&mut stream(trial.seed(), "advice/random"), scene.design.count)?;
                 let rms = |set: &[f64]| {
                     let result = trial.calibrate(set)?;
-                    Ok::<_, SessionError>(result.converged.then_some(result.after.position_m.rms))
+                    let held = result.identification.rank < rank;
+                    Ok::<_, SessionError>((result.converged.then_some(result.after.position_m.rms), held))
                 };
                 let errors = [rms(&chosen)?, rms(&drawn)?];
                 bench.watcher.step();
                 Ok(errors)
             })
             .collect::<Result<_, SessionError>>()?;
-        let (ours, theirs): (Vec<f64>, Vec<f64>) =
-            errors.iter().filter_map(|[ours, theirs]| Some((*ours.as_ref()?, *theirs.as_ref()?))).unzip();
+        let (ours, theirs): (Vec<f64>, Vec<f64>) = fits.iter().filter_map(|[ours, theirs]| Some((ours.0?, theirs.0?))).unzip();
         outcomes.push(Outcome {
             label,
             effects: situation.effects,
@@ -89,12 +97,14 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
             predicted_random_mm: 1e3 * random.position_rms_m,
             fits: Tally {
                 fits: 2 * trials,
-                not_converged: errors.iter().flatten().filter(|error| error.is_none()).count(),
-                held: 0,
+                not_converged: fits.iter().flatten().filter(|(error, _)| error.is_none()).count(),
+                held: fits.iter().flatten().filter(|(_, held)| *held).count(),
             },
         });
     }
-    Ok(findings(bench, &outcomes))
+    let mut findings = findings(bench, &outcomes);
+    findings.notes.extend(skipped);
+    Ok(findings)
 }
 
 /// Situations with their scenes: names, and where the model misses nothing and where it does.
@@ -110,7 +120,7 @@ fn cells(base: &Scene) -> Vec<(String, Scene, Situation)> {
                     let situation = Situation { sees, reach: kind, effects, count };
                     let mut scene = situation.scene(base);
                     match reach {
-                        Some(half) => limit(&mut scene, half),
+                        Some(half) => scene.arm = cut(&scene.arm, half),
                         None => scene.sensor.view.iter_mut().for_each(|view| view.half_angle_rad = CONE_RAD),
                     }
                     scene.design.method = Method::default();
@@ -144,6 +154,9 @@ fn findings(bench: &Bench<'_>, outcomes: &[Outcome]) -> Findings {
     };
     let summary = |effects: bool| {
         let pairs = of(effects);
+        if pairs.is_empty() {
+            return "nobody knows how much: no situation could be judged".to_owned();
+        }
         let distance = |(outcome, measured): &(&Outcome, Mean)| percent((outcome.predicted - measured.mean).abs());
         let within = pairs.iter().filter(|(outcome, measured)| {
             measured.interval95.is_some_and(|[low, high]| low <= outcome.predicted && outcome.predicted <= high)
@@ -200,7 +213,7 @@ fn findings(bench: &Bench<'_>, outcomes: &[Outcome]) -> Findings {
     let fits = outcomes.iter().fold(Tally::default(), |sum, outcome| Tally {
         fits: sum.fits + outcome.fits.fits,
         not_converged: sum.not_converged + outcome.fits.not_converged,
-        held: 0,
+        held: sum.held + outcome.fits.held,
     });
     Findings {
         item: EXPERIMENT.name,

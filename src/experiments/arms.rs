@@ -1,6 +1,7 @@
 //! The arms on which every claim is tried, and arms with narrower joints.
 
 use crate::arm::Arm;
+use crate::kinematics::JointKind;
 use crate::scene::{self, SceneError, SceneFile};
 
 /// Scenes of the arms: the substitute for the paper's, one with parallel axes, and one that exists. They are part of the program,
@@ -22,23 +23,23 @@ pub fn arms() -> Result<Vec<SceneFile>, SceneError> {
     SCENES.iter().map(|(name, text)| scene::parse(&text.replace(key, &format!("urdf = '''\n{urdf}'''")), name)).collect()
 }
 
-/// `arm` with every joint's range cut to its middle ± `half_width` (rad or m), where it was wider.
+/// `arm` with the range of every joint that turns cut to its middle ± `half_width` (rad), where it was wider.
 #[must_use]
 pub fn cut(arm: &Arm, half_width: f64) -> Arm {
-    with_half_widths(arm, |half| half.min(half_width))
+    with_half_widths(arm, |kind, half| if kind == JointKind::Revolute { half.min(half_width) } else { half })
 }
 
 /// `arm` with every joint's range narrowed about its middle by `factor`.
 #[must_use]
 pub fn narrowed(arm: &Arm, factor: f64) -> Arm {
-    with_half_widths(arm, |half| half * factor)
+    with_half_widths(arm, |_, half| half * factor)
 }
 
-fn with_half_widths(arm: &Arm, change: impl Fn(f64) -> f64) -> Arm {
+fn with_half_widths(arm: &Arm, change: impl Fn(JointKind, f64) -> f64) -> Arm {
     let mut arm = arm.clone();
     for joint in &mut arm.chain.joints {
         let (middle, half) = (0.5 * (joint.lower + joint.upper), 0.5 * (joint.upper - joint.lower));
-        let changed = change(half);
+        let changed = change(joint.kind, half);
         // Limits that stay are left as they are, to the last bit.
         if changed < half {
             (joint.lower, joint.upper) = (middle - changed, middle + changed);

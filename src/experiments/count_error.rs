@@ -13,8 +13,8 @@ use super::published::Published;
 use super::statistics::Mean;
 use super::trial::Trial;
 use crate::design::candidates::{Rules, Sampler};
+use crate::figure::{Axis, Colour, Figure, Kind, Marker, Panel, Series};
 use crate::quality::prediction::Prediction;
-use crate::report::figure::{Axis, Colour, Figure, Kind, Marker, Panel, Series};
 use crate::seed::stream;
 use crate::session::SessionError;
 

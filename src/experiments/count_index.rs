@@ -13,11 +13,11 @@ use super::published::Published;
 use super::statistics::Mean;
 use crate::design::candidates::{Rules, Sampler};
 use crate::design::objective::Models;
+use crate::figure::{Axis, Colour, Figure, Kind, Marker, Panel, Series};
 use crate::quality::dense;
 use crate::quality::evaluator::comprehensive;
 use crate::quality::globality::dispersion;
 use crate::quality::observability::observability;
-use crate::report::figure::{Axis, Colour, Figure, Kind, Marker, Panel, Series};
 use crate::seed::{derive, stream};
 use crate::session::SessionError;
 

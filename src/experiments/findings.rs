@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::statistics::Mean;
-use crate::report::figure::Figure;
+use crate::figure::Figure;
 
 /// Everything that one experiment found on one arm.
 #[derive(Clone, Debug, Serialize)]

@@ -16,13 +16,13 @@ use super::findings::{Claim, Data, Findings};
 use super::pictures::{end_points, in_workspace, reach};
 use super::published::{Extremes, Published};
 use super::trial::Trial;
-use crate::design::candidates::{AlwaysColliding, Rules, RulesScratch, Sampler};
+use crate::design::candidates::{NothingMeasurable, Rules, RulesScratch, Sampler};
+use crate::figure::{Axis, Colour, Figure, Kind, Marker, Panel, Series};
 use crate::identification::outcome::{Errors, Summary};
 use crate::kinematics::ChainAt;
 use crate::quality::Indexes;
 use crate::quality::evaluator::Scratch;
 use crate::quality::globality::{WorkspaceGrid, dispersion};
-use crate::report::figure::{Axis, Colour, Figure, Kind, Marker, Panel, Series};
 use crate::scene::EvennessDomain;
 use crate::seed::{Stream, stream};
 use crate::session::SessionError;
@@ -243,7 +243,7 @@ fn ball(
     seed: u64,
     count: usize,
     target: f64,
-) -> Result<(Ball, f64, bool), AlwaysColliding> {
+) -> Result<(Ball, f64, bool), NothingMeasurable> {
     let arm = rules.arm();
     let pool = end_points(arm, &Sampler::new(rules).draw(&mut stream(seed, "globality/ball"), POOL)?);
     let of_a = end_points(arm, &Sampler::new(narrow).draw(&mut stream(seed, "globality/ranges"), SETS * count)?);

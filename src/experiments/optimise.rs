@@ -12,7 +12,7 @@ use super::findings::{Claim, Data, Findings, Tally};
 use super::pictures::{end_points, in_workspace, reach};
 use super::published::Published;
 use crate::design::search::Told;
-use crate::report::figure::{Axis, Figure, Kind, Panel, Series};
+use crate::figure::{Axis, Figure, Kind, Panel, Series};
 use crate::scene::{Criterion, Method};
 use crate::session::SessionError;
 

@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use super::statistics::Mean;
 use crate::arm::Arm;
-use crate::design::candidates::{AlwaysColliding, Rules, Sampler};
-use crate::report::figure::{Axis, BandPoint, Colour, Figure, Kind, Marker, Panel, Series};
+use crate::design::candidates::{NothingMeasurable, Rules, Sampler};
+use crate::figure::{Axis, BandPoint, Colour, Figure, Kind, Marker, Panel, Series};
 use crate::seed::stream;
 
 /// Points that show where the arm reaches.
@@ -18,7 +18,7 @@ pub(super) fn end_points(arm: &Arm, configurations: &[f64]) -> Vec<Vector3<f64>>
 }
 
 /// End points of random configurations: where the arm reaches.
-pub(super) fn reach(arm: &Arm) -> Result<Vec<Vector3<f64>>, AlwaysColliding> {
+pub(super) fn reach(arm: &Arm) -> Result<Vec<Vector3<f64>>, NothingMeasurable> {
     let rules = Rules::reachable(arm);
     Ok(end_points(arm, &Sampler::new(&rules).draw(&mut stream(0, "reproduce/reach"), CLOUD)?))
 }

@@ -6,9 +6,9 @@ use super::Experiment;
 use super::bench::{Bench, mean_of};
 use super::findings::{Claim, Data, Findings, Tally};
 use crate::design::candidates::{Rules, Sampler};
+use crate::figure::{Axis, Colour, Figure, Kind, Marker, Panel, Series};
 use crate::quality::Indexes;
 use crate::quality::evaluator::Scratch;
-use crate::report::figure::{Axis, Colour, Figure, Kind, Marker, Panel, Series};
 use crate::seed::{derive, stream};
 use crate::session::SessionError;
 

@@ -6,6 +6,7 @@
 use nalgebra::Point3;
 use serde::Serialize;
 
+use super::arms::cut;
 use crate::measurement::{Sensor, View};
 use crate::scene::{Injected, JointClearance, Noise, Scene, Thermal, ThermalProfile, Weights};
 
@@ -66,7 +67,7 @@ impl Situation {
                 .then(|| View { towards_in_base: Point3::new(0.4, 0.0, 0.5), half_angle_rad: CONE_RAD }),
         };
         if self.reach == Reach::Limited {
-            limit(&mut scene, LIMITED_RAD);
+            scene.arm = cut(&scene.arm, LIMITED_RAD);
         }
         scene.weights = Weights::Noise;
         scene.design.count = self.count;
@@ -116,13 +117,5 @@ impl Situation {
             Reach::Cone => "cone ±12°",
         };
         format!("{sees}, {reach}, effects {}", if self.effects { "on" } else { "off" })
-    }
-}
-
-/// Cuts every joint of `scene` to ±`half` (rad, or m) about the middle of its range.
-pub fn limit(scene: &mut Scene, half: f64) {
-    for joint in &mut scene.arm.chain.joints {
-        let middle = 0.5 * (joint.lower + joint.upper);
-        (joint.lower, joint.upper) = (joint.lower.max(middle - half), joint.upper.min(middle + half));
     }
 }

@@ -87,6 +87,28 @@ impl InformationModel {
         self.chain.jacobian_into(joints, &mut scratch.rows, n).1
     }
 
+    /// Whether what the fit assumes of the noise is what the sensor declares, so that (XᵀX)⁻¹ is the covariance.
+    #[must_use]
+    pub fn as_declared(&self) -> bool {
+        let sensor = &self.sensor;
+        let alike = |sigma: f64| (sigma - sensor.position_sigma_m).abs() <= 1e-9 * sensor.position_sigma_m;
+        match self.weights {
+            Weights::Noise => true,
+            Weights::Unit => sensor.position_sigma_per_m == 0.0 && sensor.attitude_sigma_rad.is_none_or(alike),
+        }
+    }
+
+    /// Scales the rows of the block of a reading at `end_point` by the declared sigmas over the assumed ones: with these rows Y,
+    /// the covariance of an estimate is (XᵀX)⁻¹ YᵀY (XᵀX)⁻¹.
+    pub fn noise_into(&self, end_point: &Vector3<f64>, block: &mut [f64]) {
+        let (position, attitude) = self.sigmas(end_point);
+        let declared = [self.sensor.position_sigma_at(end_point), self.sensor.attitude_sigma_rad.unwrap_or(attitude)];
+        let factors = [declared[0] / position, declared[1] / attitude];
+        for (component, row) in block.chunks_exact_mut(self.rank()).enumerate() {
+            row.iter_mut().for_each(|entry| *entry *= factors[component / 3]);
+        }
+    }
+
     /// Standard deviations of a reading at `end_point` as the fit takes them: m, rad. One where nothing is declared, so that
     /// variances are then relative.
     fn sigmas(&self, end_point: &Vector3<f64>) -> (f64, f64) {

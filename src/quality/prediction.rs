@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::dense;
 use super::information::{InformationModel, JacobianScratch};
 
-/// Configurations of the sample at which the worst point is looked for.
+/// Configurations of the sample at which the G-criterion looks for the worst point.
 const WORST_POINTS: usize = 200;
 
 /// The workspace as a sample of configurations, prepared for one arm and what is identified of it.
@@ -20,8 +20,10 @@ pub struct PredictionWorkspace {
     position: Vec<f64>,
     /// The same for the attitude rows (rad²).
     attitude: Vec<f64>,
-    /// Position rows of the first points, 3 × rank each.
+    /// Position rows of the first points, 3 × rank each: those that the G-criterion looks at.
     points: Vec<f64>,
+    /// Those of the others, at which what was chosen is judged; the same where there are none.
+    judged: Vec<f64>,
 }
 
 /// What is expected of a calibrated model that has no error but what noise left in it.
@@ -31,7 +33,8 @@ pub struct Prediction {
     pub position_rms_m: f64,
     /// Root of the mean squared attitude error (rotation vector), rad.
     pub attitude_rms_rad: f64,
-    /// Root of the largest mean squared position error at a point of the workspace, m: the root of the G-criterion.
+    /// Root of the largest mean squared position error at any of some hundred sampled points of the workspace, m. They are others
+    /// than those at which the G-criterion is computed.
     pub position_worst_m: f64,
 }
 
@@ -43,19 +46,21 @@ impl PredictionWorkspace {
         let mut rows = vec![0.0; 6 * rank];
         let mut scratch = JacobianScratch::default();
         let (mut position, mut attitude) = (vec![0.0; rank * rank], vec![0.0; rank * rank]);
-        let mut points = Vec::new();
+        let (mut points, mut judged) = (Vec::new(), Vec::new());
         let share = joint_count as f64 / configurations.len().max(1) as f64;
         for (index, joints) in configurations.chunks_exact(joint_count).enumerate() {
             model.unscaled_into(joints, &mut scratch, &mut rows);
             dense::add_gram(&rows[..3 * rank], share, rank, &mut position);
             dense::add_gram(&rows[3 * rank..], share, rank, &mut attitude);
-            if index < WORST_POINTS {
-                points.extend_from_slice(&rows[..3 * rank]);
-            }
+            let of = if index < WORST_POINTS { &mut points } else { &mut judged };
+            of.extend_from_slice(&rows[..3 * rank]);
         }
         dense::mirror(&mut position, rank);
         dense::mirror(&mut attitude, rank);
-        PredictionWorkspace { rank, position, attitude, points }
+        if judged.is_empty() {
+            judged.clone_from(&points);
+        }
+        PredictionWorkspace { rank, position, attitude, points, judged }
     }
 
     /// L of the I-criterion tr(L M⁻¹): mean of PᵀP over the workspace, position rows; row-major `rank × rank`, both triangles.
@@ -71,26 +76,49 @@ impl PredictionWorkspace {
         dense::dot(&self.position, &dense::inverse(factor, self.rank))
     }
 
-    /// G-criterion: largest variance of the predicted position at a point of the workspace, m².
+    /// G-criterion: largest variance of the predicted position at 200 sampled points of the workspace, m².
     #[must_use]
     pub fn worst_variance(&self, factor: &[f64]) -> f64 {
-        let inverse = dense::inverse(factor, self.rank);
-        let variance = |rows: &[f64]| rows.chunks_exact(self.rank).map(|row| dense::quadratic(&inverse, row)).sum::<f64>();
-        self.points.chunks_exact(3 * self.rank).map(variance).fold(0.0, f64::max)
+        self.worst(&self.points, &dense::inverse(factor, self.rank))
     }
 
-    /// What a set with this information (lower triangle, row-major) lets expect; `None` where it does not determine the parameters.
+    /// What a set with this information (lower triangle, row-major) lets expect, where the readings are as noisy as it assumes;
+    /// `None` where it does not determine the parameters.
     #[must_use]
     pub fn predict(&self, information: &[f64]) -> Option<Prediction> {
         let mut factor = information.to_vec();
-        dense::cholesky(&mut factor, self.rank).then(|| {
-            let inverse = dense::inverse(&factor, self.rank);
-            Prediction {
-                position_rms_m: dense::dot(&self.position, &inverse).max(0.0).sqrt(),
-                attitude_rms_rad: dense::dot(&self.attitude, &inverse).max(0.0).sqrt(),
-                position_worst_m: self.worst_variance(&factor).max(0.0).sqrt(),
-            }
-        })
+        dense::cholesky(&mut factor, self.rank).then(|| self.of_covariance(&dense::inverse(&factor, self.rank)))
+    }
+
+    /// The same for readings whose noise is another: `noise` is the Gram matrix (lower triangle) of the rows scaled by it
+    /// ([`InformationModel::noise_into`]).
+    #[must_use]
+    pub fn predict_with(&self, information: &[f64], noise: &[f64]) -> Option<Prediction> {
+        let (n, mut factor, mut noise) = (self.rank, information.to_vec(), noise.to_vec());
+        if !dense::cholesky(&mut factor, n) {
+            return None;
+        }
+        dense::mirror(&mut noise, n);
+        let inverse = dense::inverse(&factor, n);
+        let (mut half, mut covariance) = (vec![0.0; n * n], vec![0.0; n * n]);
+        dense::multiply(&inverse, &noise, n, &mut half);
+        dense::multiply(&half, &inverse, n, &mut covariance);
+        Some(self.of_covariance(&covariance))
+    }
+
+    /// From the covariance of the parameters, both triangles.
+    fn of_covariance(&self, covariance: &[f64]) -> Prediction {
+        Prediction {
+            position_rms_m: dense::dot(&self.position, covariance).max(0.0).sqrt(),
+            attitude_rms_rad: dense::dot(&self.attitude, covariance).max(0.0).sqrt(),
+            position_worst_m: self.worst(&self.judged, covariance).max(0.0).sqrt(),
+        }
+    }
+
+    /// Largest position variance at `points`, m².
+    fn worst(&self, points: &[f64], covariance: &[f64]) -> f64 {
+        let variance = |rows: &[f64]| rows.chunks_exact(self.rank).map(|row| dense::quadratic(covariance, row)).sum::<f64>();
+        points.chunks_exact(3 * self.rank).map(variance).fold(0.0, f64::max)
     }
 }
 

@@ -148,6 +148,8 @@ struct DesignForm {
     random: RandomReference,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     advice: Option<Advice>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    no_advice: Option<String>,
     dropped_parameters: Vec<String>,
     evaluations: u64,
     rejections: u64,

@@ -133,6 +133,7 @@ fn events(size: &Size) -> Vec<Event> {
         criterion: "comprehensive".to_owned(),
         value: stream.uniform(0.0, 1.0),
         advice: None,
+        no_advice: None,
         configurations: configurations(&mut stream, size.configurations),
         indexes: indexes(&mut stream),
         indexes_all_parameters: indexes(&mut stream),

@@ -35,7 +35,7 @@ pub(super) fn section(outcome: &DesignOutcome, advice: &Advice) -> String {
         bound,
     ];
     let header =
-        ["error that noise will leave", "RMS (mm)", "min … max", "gain on random (%)", "attitude (°)", "worst point (mm)"];
+        ["error that noise will leave", "RMS (mm)", "min … max", "gain on random (%)", "attitude (°)", "worst of 300 (mm)"];
     let mut text = format!("\nPosition error that noise will leave over the workspace:\n{}\n", table(&header, rows));
     if advice.random_undetermined > 0 {
         let undetermined = advice.random_undetermined;
@@ -44,8 +44,7 @@ pub(super) fn section(outcome: &DesignOutcome, advice: &Advice) -> String {
     text.push_str(&sentence(outcome, advice));
     text.push_str(&format!(
         "This is noise alone: play, bending, warming and whatever else the model leaves out come on top, whatever is chosen.\n\
-         The bound rests on {} configurations that were looked at; {} % of the variance are taken off for what they may have \
-         missed.\n",
+         The bound is exact for {} candidate configurations, {} % of the variance off for the best that a search found beside them.\n",
         advice.bound_candidates,
         number(100.0 * advice.bound_gap)
     ));
@@ -54,7 +53,7 @@ pub(super) fn section(outcome: &DesignOutcome, advice: &Advice) -> String {
 
 /// Whether choosing pays, and what this choice has of it.
 fn sentence(outcome: &DesignOutcome, advice: &Advice) -> String {
-    const BETTER: &str = "`--set design.criterion=i_optimality --set design.method=coordinate_exchange` chooses for this error";
+    const BETTER: &str = "`--set design.criterion=i_optimality --set design.method=perturbation` chooses for this error";
     let count = outcome.configurations.len();
     let (random, chosen) = match (advice.random, advice.chosen) {
         (Some(random), Some(chosen)) => (random.position_rms_m, chosen.position_rms_m),
@@ -78,12 +77,12 @@ fn sentence(outcome: &DesignOutcome, advice: &Advice) -> String {
             percent(possible.max(0.0))
         ));
     } else if gained < 0.0 {
-        text.push_str(&format!("Up to {} less than random is possible.\n", percent(possible)));
+        text.push_str(&format!("No set leaves more than {} less than random ones do.\n", percent(possible)));
     } else {
         // The error falls with the root of the number of configurations.
         let ratio = random / chosen;
         text.push_str(&format!(
-            "This set gains {} of the {} that are possible: it takes about {:.0} random configurations to leave as little as \
+            "This set gains {} where at most {} can be gained: it takes about {:.0} random configurations to leave as little as \
              these {count}.\n",
             percent(gained),
             percent(possible),
@@ -115,6 +114,7 @@ mod tests {
             evenness_domains: EvennessDomains::default(),
             random: RandomReference { sets: 30, mean: indexes, min: indexes, max: indexes },
             advice: None,
+            no_advice: None,
             dropped_parameters: Vec::new(),
             evaluations: 1,
             rejections: 0,
@@ -147,7 +147,7 @@ mod tests {
             "random, mean of 28 sets",
             "2 of 30 random sets",
             "0.0450 … 0.0550",
-            "gains 20.0 % of the 40.0 % that are possible",
+            "gains 20.0 % where at most 40.0 % can be gained",
             // 40 · (5/4)² = 62.5, to even.
             "about 62 random configurations",
             "no choice of 40 can do better than",
@@ -168,10 +168,11 @@ mod tests {
 
     #[test]
     fn a_set_worse_than_random_is_called_so_with_what_to_do() {
-        for (bound, more) in [(0.03, "Up to 40.0 % less than random is possible"), (0.049, "Choosing hardly pays")] {
+        for (bound, more) in [(0.03, "No set leaves more than 40.0 % less than random ones do"), (0.049, "Choosing hardly pays")]
+        {
             let text = text(Some(0.05), Some(0.055), bound);
             assert!(text.contains("chosen by pso on comprehensive, leaves 10.0 % more than random ones do"), "{text}");
-            let remedy = "--set design.criterion=i_optimality --set design.method=coordinate_exchange";
+            let remedy = "--set design.criterion=i_optimality --set design.method=perturbation";
             assert!(text.contains(remedy) && text.contains(more), "{text}");
         }
     }

@@ -1,6 +1,5 @@
 //! Results as tables and figures for people. Units are in the headers; machines get the same results as JSON.
 
-pub mod figure;
 pub mod findings;
 
 mod advice;
@@ -92,6 +91,9 @@ pub fn design(outcome: &DesignOutcome, parameter_count: usize, scaling: Jacobian
         outcome.evenness_domains.reachable,
         outcome.evenness_domains.bounding_cube,
     ));
+    if let Some(reason) = &outcome.no_advice {
+        text.push_str(&format!("Whether choosing pays cannot be told: {reason}.\n"));
+    }
     if let Some(advice) = &outcome.advice {
         text.push_str(&advice::section(outcome, advice));
     }
@@ -104,7 +106,6 @@ fn stop(reason: StopReason) -> &'static str {
         StopReason::Converged => "no particle moved any more",
         StopReason::Drawn => "drawn once",
         StopReason::BudgetSpent => "budget spent",
-        StopReason::LocalOptimum => "no change makes it better",
     }
 }
 

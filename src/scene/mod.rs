@@ -75,7 +75,8 @@ pub struct DesignProblem {
 pub enum Method {
     /// Particle swarm (Chen et al. 2019, eqs. 33–38).
     Pso,
-    /// Particle swarm with the constriction, mutation and restart of improved swarms (after Wang et al. 2018).
+    /// Particle swarm with falling inertia, bounded velocity and restarts of what stagnates (in the spirit of Wang et al. 2018; not
+    /// its formulas).
     ImprovedPso,
     /// Adding and deleting candidates with excursions (Mitchell 1974).
     Detmax,
@@ -86,9 +87,9 @@ pub enum Method {
     /// Few configurations, each measured several times, by genetic algorithm and gradient search (after Wu et al. 2015).
     GeneticRepeated,
     /// Perturbation of configurations with a few DETMAX steps (after Wang et al. 2017).
+    #[default]
     Perturbation,
     /// One joint of one configuration at a time (Meyer and Nachtsheim 1995).
-    #[default]
     CoordinateExchange,
     /// The best of many random sets.
     BestOfRandom,

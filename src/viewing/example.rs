@@ -162,6 +162,7 @@ fn events(particles: usize, count: usize, iterations: usize, held_out: usize) ->
         criterion: "comprehensive".to_owned(),
         value: indexes(1.0).comprehensive,
         advice: None,
+        no_advice: None,
         configurations: goal.clone(),
         indexes: indexes(1.0),
         indexes_all_parameters: indexes(1.0),

@@ -57,7 +57,6 @@ impl Summary {
             StopReason::Converged => "converged",
             StopReason::Drawn => "drawn",
             StopReason::BudgetSpent => "budget spent",
-            StopReason::LocalOptimum => "no change makes it better",
         };
         let mut text = format!(
             "#### Design\n{} configurations by `{}` on `{}`: **{}**; {stop}, {} evaluations, {} rejections; rank {}.\n\n\
