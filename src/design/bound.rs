@@ -167,6 +167,7 @@ fn climb(
 mod tests {
     use super::*;
     use crate::design::advice::advise;
+    use crate::experiments::statistics::Mean;
     use crate::experiments::trial::Trial;
     use crate::measurement::Sensor;
     use crate::scene::{Injected, Noise, Scene, Weights};
@@ -195,18 +196,19 @@ mod tests {
             let rules = Rules::measurable(&scene.arm, &scene.sensor);
             let set = Sampler::new(&rules).draw(&mut stream(1, "test/prediction"), 20).unwrap();
             let predicted = models.predict(&set, scene.arm.joint_count()).unwrap();
-            let mut ratios = [0.0; 2];
-            for number in 0..20 {
+            let mut ratios = [Vec::new(), Vec::new()];
+            for number in 0..40 {
                 let after = Trial::new(&scene, &injected, number).unwrap().calibrate(&set).unwrap().after;
-                ratios[0] += (after.position_m.rms / predicted.position_rms_m).powi(2) / 20.0;
-                ratios[1] += (after.rotation_rad.unwrap().rms / predicted.attitude_rms_rad).powi(2) / 20.0;
+                ratios[0].push((after.position_m.rms / predicted.position_rms_m).powi(2));
+                ratios[1].push((after.rotation_rad.unwrap().rms / predicted.attitude_rms_rad).powi(2));
             }
-            println!("{weights:?}, {attitude_sigma_rad}: {ratios:?}");
-            // Four standard errors of a mean of 20 with some 36 degrees of freedom each.
-            assert!(
-                ratios.iter().all(|ratio| (ratio - 1.0).abs() < 4.0 * (2.0f64 / 36.0 / 20.0).sqrt()),
-                "{weights:?}: {ratios:?}"
-            );
+            for ratios in ratios {
+                let Mean { mean, interval95, .. } = Mean::of(&ratios).unwrap();
+                println!("{weights:?}, {attitude_sigma_rad}: {mean} in {interval95:?}");
+                // Twice the 95 % interval: four standard errors.
+                let half = mean - interval95.unwrap()[0];
+                assert!((mean - 1.0).abs() < 2.0 * half && half < 0.2, "{weights:?}: {mean} ± {half}");
+            }
             let advice = advise(&scene, &models, &rules, &set, &[set.clone()]);
             // Noise that the fit does not assume has no bound.
             assert_eq!(advice.is_ok(), weights == Weights::Noise || attitude_sigma_rad == 20e-6);

@@ -3,7 +3,7 @@
 //! From a set of m members, an excursion adds the best candidates and takes the worst members until it is back at m, over sets of
 //! up to m + 6 or down to m − 6: a set larger than m loses a member unless it stood in an excursion that failed since the last
 //! improvement, in which case it gains another, and the other way round. An excursion that comes back better is the new start. The
-//! search ends when excursions both up and down have left the allowed sizes, and starts again from other random members while
+//! search ends when two excursions have left the allowed sizes, or eight in a row brought nothing, and starts again from other random members while
 //! budget is left; where it has not been told otherwise the criterion is the determinant, but any criterion will do.
 
 use std::collections::BTreeSet;
@@ -17,8 +17,8 @@ use crate::seed::Stream;
 const EXCURSION: usize = 6;
 /// A gain smaller than this is nothing, or rounding where the information is nearly singular.
 const NOTHING: f64 = 1e-6;
-/// Excursions of one search, per member: where rounding feigns gains, it ends all the same.
-const MOST_EXCURSIONS: usize = 50;
+/// Excursions in a row that bring nothing, after which a search ends wherever they went: deeper ones cost more than a new start.
+const FRUITLESS: usize = 8;
 
 /// Searches from random members of a random pool, again and again while the budget lasts.
 ///
@@ -79,11 +79,10 @@ pub(super) fn climb(
     tell(home.members(), home.value(), false)?;
     let mut failed: BTreeSet<Vec<usize>> = BTreeSet::new();
     let mut up = true;
-    // Whether an excursion down, and one up, has left the sizes since the last improvement.
-    let mut gave_up = [false; 2];
-    let mut excursions = 0;
-    while !(gave_up[0] && gave_up[1]) && task.left() > 0 && excursions < MOST_EXCURSIONS * count {
-        excursions += 1;
+    // Excursions that have left the sizes since the last improvement.
+    let mut gave_up = 0;
+    let mut fruitless = 0;
+    while gave_up < 2 && task.left() > 0 && fruitless < FRUITLESS {
         let mut visited = Vec::new();
         let mut first = true;
         let returned = loop {
@@ -93,7 +92,8 @@ pub(super) fn climb(
             } else {
                 let mut key = set.members().to_vec();
                 key.sort_unstable();
-                let known = failed.contains(&key);
+                // A set that comes again within an excursion would come for ever.
+                let known = failed.contains(&key) || visited.contains(&key);
                 visited.push(key);
                 (size < count) != known
             };
@@ -116,11 +116,13 @@ pub(super) fn climb(
         if returned && set.value() > home.value() + NOTHING {
             home.clone_from(&set);
             failed.clear();
-            gave_up = [false; 2];
+            gave_up = 0;
+            fruitless = 0;
             tell(home.members(), home.value(), false)?;
         } else {
             failed.extend(visited);
-            gave_up[usize::from(up)] |= !returned;
+            gave_up += usize::from(!returned);
+            fruitless += 1;
             set.clone_from(&home);
             up = !up;
         }

@@ -152,7 +152,7 @@ mod tests {
             "about 62 random configurations",
             "no choice of 40 can do better than",
             "noise alone",
-            "rests on 1000 configurations",
+            "exact for 1000 candidate configurations",
             "0.1000 % of the variance",
         ] {
             assert!(text.contains(expected), "{expected}: {text}");

@@ -30,7 +30,7 @@ fn approximate_l(bencher: Bencher, count: usize) {
 }
 
 /// DETMAX for 40 of a pool of 1000, from random members to a set that no excursion makes better. Mark: 0.1 s on two cores.
-#[divan::bench(args = [scene::Criterion::DOptimality, scene::Criterion::IOptimality])]
+#[divan::bench(args = [scene::Criterion::DOptimality, scene::Criterion::IOptimality], sample_count = 20)]
 fn detmax_40_of_1000(bencher: Bencher, criterion: scene::Criterion) {
     let SceneFile { scene, .. } = paper();
     let models = Models::new(&scene).expect("free configurations");
