@@ -197,7 +197,7 @@ mod tests {
             let set = Sampler::new(&rules).draw(&mut stream(1, "test/prediction"), 20).unwrap();
             let predicted = models.predict(&set, scene.arm.joint_count()).unwrap();
             let mut ratios = [Vec::new(), Vec::new()];
-            for number in 0..40 {
+            for number in 0..60 {
                 let after = Trial::new(&scene, &injected, number).unwrap().calibrate(&set).unwrap().after;
                 ratios[0].push((after.position_m.rms / predicted.position_rms_m).powi(2));
                 ratios[1].push((after.rotation_rad.unwrap().rms / predicted.attitude_rms_rad).powi(2));

@@ -16,6 +16,7 @@ use super::trial::Trial;
 use crate::design::candidates::{Rules, Sampler};
 use crate::design::design;
 use crate::figure::{Axis, Colour, Estimate, Figure, Kind, Panel, Series};
+use crate::quality::information::InformationModel;
 use crate::recording::event::Nobody;
 use crate::scene::{Criterion, Method, Scene};
 use crate::seed::stream;
@@ -56,6 +57,12 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
     bench.watcher.begin("advice", cells.len() * (trials + 1));
     let (mut outcomes, mut skipped) = (Vec::new(), Vec::new());
     for (label, scene, situation) in cells {
+        let information = InformationModel::new(&scene.arm, &scene.sensor, scene.weights);
+        if scene.design.count * information.rows_per_pose() < information.rank() {
+            skipped.push(format!("{label}: left out, so few configurations do not determine the parameters."));
+            (0..=trials).for_each(|_| bench.watcher.step());
+            continue;
+        }
         let chosen = design(&scene, &mut Nobody);
         bench.watcher.step();
         let outcome = chosen?;
