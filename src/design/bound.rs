@@ -209,7 +209,7 @@ mod tests {
                 let half = mean - interval95.unwrap()[0];
                 assert!((mean - 1.0).abs() < 2.0 * half && half < 0.2, "{weights:?}: {mean} ± {half}");
             }
-            let advice = advise(&scene, &models, &rules, &set, &[set.clone()]);
+            let advice = advise(&scene, &models, &rules, &set, std::slice::from_ref(&set));
             // Noise that the fit does not assume has no bound.
             assert_eq!(advice.is_ok(), weights == Weights::Noise || attitude_sigma_rad == 20e-6);
         }
