@@ -1,7 +1,7 @@
 //! Chen et al. 2019, section V.C.2, Table 5 and Fig. 12: choosing a set, by the paper's swarm and by all other methods.
 //!
 //! First the swarm with the settings of Table 5 on O_C, under every scaling of the Jacobian. Then every method on O_C, I-optimality and
-//! D-optimality with the budget of that swarm, and on the latter two with [`LEISURE`] times as much. What they reach stands beside what
+//! D-optimality with the budget of that swarm, and on the latter two with ten times as much. What they reach stands beside what
 //! no set can go beyond.
 
 use std::time::Instant;
