@@ -113,6 +113,7 @@ pub fn measure(
                 temperatures_c,
                 position_m: pose.translation.vector.into(),
                 attitude_xyzw: scene.sensor.attitude_sigma_rad.map(|_| [q.i, q.j, q.k, q.w]),
+                ..Measurement::default()
             };
             listener.take(&Event::Measured(measurement.clone()))?;
             measurements.push(measurement);

@@ -100,6 +100,7 @@ impl Situation {
                 Vec::new()
             },
             thermal: self.effects.then_some(thermal),
+            effects: Vec::new(),
             noise: Noise::Declared { factor: 1.0 },
         }
     }

@@ -6,17 +6,19 @@ use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// What a measured configuration is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
     /// Parameters are fitted to it.
+    #[default]
     Fit,
     /// It carries the reported error and is never fitted.
     HeldOut,
 }
 
-/// One measured configuration: joint readings and the tool's pose in the measurement frame.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// One measured configuration: joint readings, the tool's pose in the measurement frame, and the conditions under which it was read.
+/// What was not recorded is empty or absent.
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Measurement {
     /// Position in the order of measuring, from 0.
@@ -37,6 +39,24 @@ pub struct Measurement {
     /// Measured attitude of the tool frame as quaternion x, y, z, w; absent where the sensor sees positions only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub attitude_xyzw: Option<[f64; 4]>,
+    /// Direction of each joint's last move before the reading: -1, 0 (it did not move) or 1; empty where not recorded.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub approach: Vec<i8>,
+    /// Temperature of the air as read, °C.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ambient_c: Option<f64>,
+    /// Mass that the tool carries, as far as the cell knows, kg: a point mass at the origin of the tool frame.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub payload_kg: Option<f64>,
+    /// From the end of the last move to the reading, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dwell_s: Option<f64>,
+    /// Session: readings of one session share the set-up (tool, base, sensor).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub session: Option<String>,
+    /// Which reflector on the tool was read, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub target: Option<String>,
 }
 
 impl Measurement {

@@ -104,6 +104,7 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
             temperatures_c: vec![0.0; layout.sensors],
             position_m: [0.0; 3],
             attitude_xyzw: layout.attitude.then_some([0.0; 4]),
+            ..Measurement::default()
         };
         for ((column, text), name) in columns.iter().zip(record.iter()).zip(header.iter()) {
             let number = || match text.parse::<f64>() {
@@ -325,6 +326,7 @@ mod tests {
             temperatures_c: vec![20.1, 1.0 / 3.0],
             position_m: [1.0 / 3.0, -2.0 / 7.0, 1e-9],
             attitude_xyzw: Some([0.5, -0.5, 0.5, -0.5]),
+            ..Measurement::default()
         };
         let rows = vec![row(0), row(1), row(2)];
         assert_eq!(parse(&write(&rows), "t.csv").unwrap().measurements, rows);

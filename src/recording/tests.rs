@@ -155,6 +155,7 @@ fn events(size: &Size) -> Vec<Event> {
             temperatures_c: if index % 2 == 0 { vec![22.0, 22.5] } else { Vec::new() },
             position_m: (pose.translation.vector.map(|value| value + stream.uniform(-1e-3, 1e-3))).into(),
             attitude_xyzw: (index % 3 != 0).then(|| pose.rotation.coords.into()),
+            ..Measurement::default()
         }));
     }
     events.push(Event::Note("fitting".to_owned()));

@@ -6,7 +6,7 @@ use super::error::{Invalid, suggestion};
 use super::file::*;
 use super::urdf;
 use super::{
-    DesignProblem, EvennessDomain, Injected, JacobianScaling, JointClearance, Noise, Plan, Scene, Swarm, Thermal, ThermalProfile,
+    Approach, ApproachPolicy, DesignProblem, EvennessDomain, Injected, JacobianScaling, JointClearance, Noise, Plan, Scene, Swarm, Thermal, ThermalProfile,
     Weights,
 };
 use crate::arm::{Arm, Fixture, Geometry, Inertial, Link, Shape};
@@ -518,6 +518,12 @@ fn plan(file: &PlanToml) -> Checked<Plan> {
         held_out_exact: file.held_out_exact,
         seconds_per_pose: at_most(positive(file.seconds_per_pose, "plan.seconds_per_pose")?, 1e6, "plan.seconds_per_pose")?,
         reference_temperature_c,
+        repeats: 1,
+        approach: Approach { policy: ApproachPolicy::Direct, travel_rad: 0.1, travel_m: 0.01 },
+        dwell_s: 0.0,
+        payloads_kg: vec![0.0],
+        payload_blocks: false,
+        temperature: None,
     })
 }
 
@@ -562,6 +568,7 @@ pub(super) fn injected(file: &InjectedToml, arm: &Arm) -> Checked<Injected> {
         parameter_errors,
         clearances,
         thermal,
+        effects: Vec::new(),
         noise: noise(&file.noise)?,
     })
 }

@@ -203,6 +203,7 @@ fn events(particles: usize, count: usize, iterations: usize, held_out: usize) ->
             position_m: measured.translation.vector.into(),
             attitude_xyzw: Some([q.i, q.j, q.k, q.w]),
             joints: joints.clone(),
+            ..Measurement::default()
         }));
         let six = |predicted: &Pose| -> [f64; 6] { pose_error(&measured, predicted).into() };
         residuals.push(Residual {

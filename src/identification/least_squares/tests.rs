@@ -32,6 +32,7 @@ fn measure(arm: &Arm, values: &[f64], count: usize, sigma: [f64; 2], attitude: b
                 temperatures_c: Vec::new(),
                 position_m: position.into(),
                 attitude_xyzw: attitude.then_some([q.i, q.j, q.k, q.w]),
+                ..Measurement::default()
             }
         })
         .collect()
