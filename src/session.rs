@@ -1,7 +1,8 @@
 //! The steps of a calibration chained: what the commands do, and what a replay does again.
 
 use crate::arm::Arm;
-use crate::cell::measure::{MeasureError, plan};
+use crate::cell::measure::MeasureError;
+use crate::cell::plan::{Planned, in_order, plan};
 use crate::cell::{Truth, measure};
 use crate::design::candidates::NothingMeasurable;
 use crate::design::outcome::DesignOutcome;
@@ -235,7 +236,7 @@ pub fn replay(
                 (Some(injected), Subject::Scene(scene)) if measured.is_none() => {
                     let planned = match &chosen {
                         Some(chosen) => plan(scene, chosen, &design::held_out(scene)?),
-                        None => planned_as_recorded(recorded),
+                        None => planned_as_recorded(scene, recorded),
                     };
                     // A recording that was cut off holds fewer poses than the session had.
                     let session = recorded.iter().find_map(|event| match event {
@@ -264,16 +265,10 @@ pub fn replay(
 }
 
 /// The plan that a recording without a design was measured by.
-fn planned_as_recorded(recorded: &[Event]) -> Vec<crate::cell::measure::Planned> {
-    recorded
-        .iter()
-        .filter_map(|event| match event {
-            Event::Measured(measurement) => Some(crate::cell::measure::Planned {
-                pose_id: measurement.pose_id,
-                role: measurement.role,
-                joints: measurement.joints.clone(),
-            }),
-            _ => None,
-        })
-        .collect()
+fn planned_as_recorded(scene: &Scene, recorded: &[Event]) -> Vec<Planned> {
+    let rows = recorded.iter().filter_map(|event| match event {
+        Event::Measured(measurement) => Some((measurement.pose_id, measurement.role, measurement.joints.clone())),
+        _ => None,
+    });
+    in_order(scene, rows.collect())
 }

@@ -3,13 +3,14 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
+use super::plan::Planned;
 use super::truth::{self, TruePose, Truth};
 use crate::frames::{Pose, rotation_from_vector};
 use crate::measurement::{Measurement, Role, Sensor};
 use crate::physics::{PhysicalArm, PhysicsError, Settled, Settling};
 use crate::recording::event::{Event, Listener, ListenerError};
 use crate::scene::{Injected, Noise, Scene};
-use crate::seed::{Stream, stream};
+use crate::seed::Stream;
 
 /// Configurations that settle side by side before they are told: bounds memory, and what a killed run loses.
 const BATCH: usize = 64;
@@ -23,30 +24,6 @@ pub enum MeasureError {
     /// Whoever records or shows the run failed.
     #[error(transparent)]
     Listener(#[from] ListenerError),
-}
-
-/// A configuration in the order of measuring.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Planned {
-    /// Same number, same configuration.
-    pub pose_id: usize,
-    /// For fitting or for verification.
-    pub role: Role,
-    /// Commanded joint coordinates, rad or m.
-    pub joints: Vec<f64>,
-}
-
-/// The order of measuring: chosen and held-out configurations shuffled, so that neither sees only one part of a drift.
-#[must_use]
-pub fn plan(scene: &Scene, chosen: &[Vec<f64>], held_out: &[Vec<f64>]) -> Vec<Planned> {
-    let of = |role, configurations: &[Vec<f64>], first: usize| {
-        let planned = configurations.iter().enumerate();
-        planned.map(|(index, joints)| Planned { pose_id: first + index, role, joints: joints.clone() }).collect::<Vec<_>>()
-    };
-    let mut planned = of(Role::Fit, chosen, 0);
-    planned.extend(of(Role::HeldOut, held_out, chosen.len()));
-    stream(scene.seed, "plan/order").shuffle(&mut planned);
-    planned
 }
 
 /// Whether the scene's true arm can be simulated: to be asked before anything is written.
@@ -108,7 +85,7 @@ pub fn measure(
                 index,
                 pose_id: planned.pose_id,
                 role: planned.role,
-                time_s: index as f64 * scene.plan.seconds_per_pose,
+                time_s: planned.time_s,
                 joints: planned.joints.clone(),
                 temperatures_c,
                 position_m: pose.translation.vector.into(),

@@ -3,6 +3,7 @@
 //! This and [`physics`](crate::physics) are the only places that see the truth.
 
 pub mod measure;
+pub mod plan;
 pub mod truth;
 
 pub use measure::{MeasureError, measure};

@@ -142,11 +142,9 @@ impl Kind {
     pub fn unit(self) -> &'static str {
         match self {
             Kind::JointCompliance | Kind::LinkBending => "rad/(N·m)",
-            Kind::Backlash
-            | Kind::GravityLostMotion
-            | Kind::JointEccentricity
-            | Kind::StrainWaveError
-            | Kind::TiltClearance => "rad",
+            Kind::Backlash | Kind::GravityLostMotion | Kind::JointEccentricity | Kind::StrainWaveError | Kind::TiltClearance => {
+                "rad"
+            }
             Kind::GearCoupling => "rad/rad",
             Kind::LinkThermalGrowth => "1/K",
             Kind::JointThermalDrift => "rad/K",

@@ -1,7 +1,7 @@
 //! One calibration of a simulated arm, judged on configurations that it has not seen.
 
 use crate::cell::measure;
-use crate::cell::measure::plan;
+use crate::cell::plan::plan;
 use crate::design::search::split;
 use crate::identification::identify_on;
 use crate::identification::outcome::{Errors, Identification, Residual};

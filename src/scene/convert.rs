@@ -6,8 +6,8 @@ use super::error::{Invalid, suggestion};
 use super::file::*;
 use super::urdf;
 use super::{
-    Approach, ApproachPolicy, DesignProblem, EvennessDomain, Injected, JacobianScaling, JointClearance, Noise, Plan, Scene, Swarm, Thermal, ThermalProfile,
-    Weights,
+    Approach, ApproachPolicy, DesignProblem, EvennessDomain, Injected, JacobianScaling, JointClearance, Noise, Plan, Scene,
+    Swarm, Thermal, ThermalProfile, Weights,
 };
 use crate::arm::{Arm, Fixture, Geometry, Inertial, Link, Shape};
 use crate::frames::Pose;

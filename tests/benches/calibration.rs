@@ -2,7 +2,7 @@
 
 use divan::{Bencher, black_box};
 use kincal::cell::measure;
-use kincal::cell::measure::plan;
+use kincal::cell::plan::plan;
 use kincal::design::candidates::{Rules, Sampler};
 use kincal::design::objective::{Models, Objective};
 use kincal::design::search::{Task, Told, split};
