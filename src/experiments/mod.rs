@@ -8,6 +8,7 @@ pub mod bake_off;
 pub mod bench;
 pub mod count_error;
 pub mod count_index;
+pub mod effect_validation;
 pub mod findings;
 pub mod globality;
 pub mod headline;
