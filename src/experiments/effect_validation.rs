@@ -106,7 +106,7 @@ pub fn cases(arm: &Arm) -> Vec<Case> {
     let (compliance, backlash, play) = (
         Effect::JointCompliance { joint: j2, stiffness: 3e4 },
         Effect::Backlash { joint: j2, width: 60.0 * ARCSEC },
-        clearance(j2, 30e-6, 10e-6, 100e-6),
+        clearance(j2, 30e-6, 0.0, 100e-6),
     );
     let joint = |joint: usize, text: &str| format!("{text}, joint {}", joint + 1);
     let link = |link: usize, text: &str| format!("{text}, link {}", link + 1);
@@ -137,7 +137,7 @@ pub fn cases(arm: &Arm) -> Vec<Case> {
         one("joint_thermal_drift", joint(j2, "15 µrad/K"), Effect::JointThermalDrift { joint: j2, drift: 15e-6 }),
         one("radial_clearance", joint(j2, "30 µm"), clearance(j2, 30e-6, 0.0, 0.0)),
         one("tilt_clearance", joint(j4, "100 µrad"), clearance(j4, 0.0, 0.0, 100e-6)),
-        one("clearance", joint(j2, "30 µm, 10 µm, 100 µrad"), play.clone()),
+        one("clearance", joint(j4, "30 µm, 10 µm, 100 µrad"), clearance(j4, 30e-6, 10e-6, 100e-6)),
     ]);
     for (moves, words) in [(Moves::Base, "base"), (Moves::Sensor, "sensor")] {
         let (translation, rotation) = drift;
