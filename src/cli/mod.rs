@@ -4,6 +4,7 @@
 
 mod arguments;
 mod design;
+mod effects;
 mod export;
 mod identify;
 mod measure;
@@ -81,6 +82,7 @@ fn dispatch(arguments: &Arguments) -> anyhow::Result<Outcome> {
         Command::Identify(options) => identify::command(global, options),
         Command::Replay(options) => replay::command(global, options),
         Command::Export(options) => export::command(global, options),
+        Command::Effects(options) => effects::command(global, options),
         Command::Reproduce(options) => reproduce::command(global, options),
     }
 }
