@@ -83,10 +83,10 @@ pub struct Surviving {
 }
 
 impl Surviving {
-    /// Share of the signal's energy that geometry swallows; `None` where there is no signal.
+    /// Share of the signal's energy that geometry swallows; `None` where there is none to speak of.
     #[must_use]
     pub fn swallowed(self) -> Option<f64> {
-        (self.signal > 0.0).then(|| (1.0 - self.lambda / self.signal).clamp(0.0, 1.0))
+        (self.signal > 1e-6).then(|| (1.0 - self.lambda / self.signal).clamp(0.0, 1.0))
     }
 }
 
