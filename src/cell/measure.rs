@@ -1,16 +1,14 @@
 //! Measuring: every configuration settles in the physics, then the sensor reads it.
 
-use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::plan::Planned;
+use super::sensor::SimulatedSensor;
 use super::truth::{self, TruePose, Truth};
-use crate::frames::{Pose, rotation_from_vector};
-use crate::measurement::{Measurement, Role, Sensor};
-use crate::physics::{PhysicalArm, PhysicsError, Settled, Settling};
+use crate::measurement::{Measurement, Role};
+use crate::physics::{Conditions, PhysicalArm, PhysicsError, Settled, Settling, Stop};
 use crate::recording::event::{Event, Listener, ListenerError};
-use crate::scene::{Injected, Noise, Scene};
-use crate::seed::Stream;
+use crate::scene::{Injected, Scene};
 
 /// Configurations that settle side by side before they are told: bounds memory, and what a killed run loses.
 const BATCH: usize = 64;
@@ -29,12 +27,11 @@ pub enum MeasureError {
 /// Whether the scene's true arm can be simulated: to be asked before anything is written.
 ///
 /// # Errors
-/// If a link has no mass, or a clearance is none.
+/// If a link has no mass, or an effect cannot be.
 pub fn check(scene: &Scene, injected: &Injected) -> Result<(), PhysicsError> {
     let parameters = truth::parameters(&scene.arm, injected, scene.seed);
     let values: Vec<f64> = parameters.iter().map(|parameter| parameter.true_value).collect();
-    let clearances = truth::clearances(&scene.arm, injected);
-    PhysicalArm::new(&scene.arm, &values, &clearances, Settling::default()).map(drop)
+    PhysicalArm::new(&scene.arm, &values, &truth::effects(injected), Settling::default()).map(drop)
 }
 
 /// Measures `planned` on the true arm that `injected` makes of the scene's, telling `listener` every measurement.
@@ -57,8 +54,10 @@ pub fn measure(
     let arm = &scene.arm;
     let parameters = truth::parameters(arm, injected, scene.seed);
     let values: Vec<f64> = parameters.iter().map(|parameter| parameter.true_value).collect();
-    let clearances = truth::clearances(arm, injected);
-    let new_arm = || PhysicalArm::new(arm, &values, &clearances, Settling::default());
+    let effects = truth::effects(injected);
+    let new_arm = || PhysicalArm::new(arm, &values, &effects, Settling::default());
+    let stops: Vec<Stop> = planned.iter().map(stop).collect();
+    let session_s = session_s(scene, planned, session_poses);
     let mut sensor = SimulatedSensor::new(&scene.sensor, injected, scene.seed);
 
     let mut measurements = Vec::with_capacity(planned.len());
@@ -69,9 +68,20 @@ pub fn measure(
             .par_iter()
             .enumerate()
             .map_init(new_arm, |physical, (offset, planned)| {
-                let rise = truth::temperature_rise(arm, injected, (batch * BATCH + offset) as f64 / last);
+                let index = batch * BATCH + offset;
+                let rise = truth::temperature_rise(arm, injected, index as f64 / last);
+                let conditions = Conditions {
+                    joints: &planned.joints,
+                    from: &planned.from,
+                    rise_k: &rise,
+                    payload_kg: planned.payload_kg,
+                    time_s: planned.time_s,
+                    session_s,
+                    dwell_s: planned.dwell_s,
+                    history: &stops[..index],
+                };
                 match physical {
-                    Ok(physical) => Ok((physical.settle(&planned.joints, &truth::growth(injected, &rise)), rise)),
+                    Ok(physical) => Ok((physical.settle(&conditions), rise)),
                     Err(error) => Err(error.clone()),
                 }
             })
@@ -79,7 +89,9 @@ pub fn measure(
         for (offset, ((settled, rise), planned)) in settled.into_iter().zip(chunk).enumerate() {
             let index = batch * BATCH + offset;
             let exact = planned.role == Role::HeldOut && scene.plan.held_out_exact;
-            let (pose, temperatures_c) = sensor.read(&settled.base_from_tool, exact, &rise, scene.plan.reference_temperature_c);
+            let share = if session_s > 0.0 { (planned.time_s / session_s).clamp(0.0, 1.0) } else { 0.0 };
+            let reference_c = scene.plan.reference_temperature_c;
+            let (pose, temperatures_c) = sensor.read(&settled.base_from_tool, exact, share, &rise, reference_c);
             let q = pose.rotation.quaternion();
             let measurement = Measurement {
                 index,
@@ -90,6 +102,9 @@ pub fn measure(
                 temperatures_c,
                 position_m: pose.translation.vector.into(),
                 attitude_xyzw: scene.sensor.attitude_sigma_rad.map(|_| [q.i, q.j, q.k, q.w]),
+                approach: planned.approach(),
+                payload_kg: Some(planned.payload_kg),
+                dwell_s: Some(planned.dwell_s),
                 ..Measurement::default()
             };
             listener.take(&Event::Measured(measurement.clone()))?;
@@ -97,54 +112,21 @@ pub fn measure(
             poses.push(TruePose::new(index, &settled, rise));
         }
     }
-    Ok((measurements, Truth { parameters, poses }))
+    Ok((measurements, Truth { parameters, effects: truth::described(arm, &effects), poses }))
 }
 
-/// The sensor with the noise that it really has.
-struct SimulatedSensor<'a> {
-    declared: &'a Sensor,
-    noise: Noise,
-    position: Stream,
-    attitude: Stream,
-    temperature: Stream,
+fn stop(planned: &Planned) -> Stop<'_> {
+    Stop {
+        joints: &planned.joints,
+        from: &planned.from,
+        payload_kg: planned.payload_kg,
+        time_s: planned.time_s,
+        dwell_s: planned.dwell_s,
+    }
 }
 
-impl<'a> SimulatedSensor<'a> {
-    fn new(declared: &'a Sensor, injected: &Injected, public_seed: u64) -> Self {
-        SimulatedSensor {
-            declared,
-            noise: injected.noise,
-            position: truth::stream(injected, public_seed, "noise/position"),
-            attitude: truth::stream(injected, public_seed, "noise/attitude"),
-            temperature: truth::stream(injected, public_seed, "noise/temperature"),
-        }
-    }
-
-    fn read(&mut self, truth: &Pose, exact: bool, rise_k: &[f64], reference_c: f64) -> (Pose, Vec<f64>) {
-        let mut normal = || Vector3::from_fn(|_, _| self.position.normal());
-        let position = match self.noise {
-            Noise::Declared { factor } => normal() * (factor * self.declared.position_sigma_at(&truth.translation.vector)),
-            Noise::Uniform { position_m, .. } => Vector3::from_fn(|_, _| self.position.uniform(-position_m, position_m)),
-            Noise::Off => Vector3::zeros(),
-        };
-        let attitude = match self.noise {
-            Noise::Declared { factor } => {
-                Vector3::from_fn(|_, _| self.attitude.normal()) * (factor * self.declared.attitude_sigma_rad.unwrap_or(0.0))
-            }
-            Noise::Uniform { attitude_rad, .. } => Vector3::from_fn(|_, _| self.attitude.uniform(-attitude_rad, attitude_rad)),
-            Noise::Off => Vector3::zeros(),
-        };
-        // The base link has no sensor. Whether there are others is public: nothing is told by their absence.
-        let temperatures = match self.declared.temperature_sigma_k {
-            Some(sigma_k) => rise_k.iter().skip(1).map(|rise| reference_c + rise + sigma_k * self.temperature.normal()).collect(),
-            None => Vec::new(),
-        };
-        if exact {
-            return (*truth, temperatures);
-        }
-        let mut read = *truth;
-        read.translation.vector += position;
-        read.rotation = rotation_from_vector(&attitude) * read.rotation;
-        (read, temperatures)
-    }
+/// Length of a session of `poses` readings of which `planned` are the first: to the last reading.
+fn session_s(scene: &Scene, planned: &[Planned], poses: usize) -> f64 {
+    let known = planned.last().map_or(0.0, |planned| planned.time_s);
+    known + poses.saturating_sub(planned.len()) as f64 * scene.plan.seconds_per_pose
 }

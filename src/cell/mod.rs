@@ -4,7 +4,8 @@
 
 pub mod measure;
 pub mod plan;
+mod sensor;
 pub mod truth;
 
 pub use measure::{MeasureError, measure};
-pub use truth::{TruePose, Truth};
+pub use truth::{TrueEffect, TruePose, Truth};

@@ -1,10 +1,14 @@
 //! The truth of one run: what was drawn from the scene's hidden part, and what the physics made of it.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use crate::arm::Arm;
-use crate::kinematics::Quantity;
-use crate::physics::{Clearance, Seat, SeatedBy, Settled};
+use crate::effects::Level;
+use crate::kinematics::{JointKind, Quantity};
+use crate::physics::{Seat, SeatedBy, Settled, Yield};
+use crate::scene::effect::Effect;
 use crate::scene::{Injected, ThermalProfile};
 use crate::seed::{Stream, hidden_key, hidden_stream};
 
@@ -14,8 +18,89 @@ use crate::seed::{Stream, hidden_key, hidden_stream};
 pub struct Truth {
     /// True value of every parameter.
     pub parameters: Vec<TrueParameter>,
+    /// What happens to the arm, its cell and its sensor besides.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<TrueEffect>,
     /// True poses in the order of measuring.
     pub poses: Vec<TruePose>,
+}
+
+/// An effect by its kind, place and magnitudes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrueEffect {
+    /// Name of the kind; `clearance` may be radial and tilting in one.
+    pub kind: String,
+    /// What it belongs to.
+    pub level: Level,
+    /// Number of the joint or link, from 1; none for the whole arm and for what has no number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub number: Option<usize>,
+    /// Its magnitude in the convention of [`crate::effects::Kind::unit`].
+    pub magnitude: f64,
+    /// Unit of the magnitude.
+    pub unit: String,
+    /// What else describes it, by name, SI.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub more: BTreeMap<String, f64>,
+}
+
+impl TrueEffect {
+    fn new(arm: &Arm, effect: &Effect) -> Self {
+        let location = effect.location();
+        let turns = location.index.is_none_or(|number| {
+            location.level != Level::Joint
+                || arm.chain.joints.get(number - 1).is_none_or(|joint| joint.kind == JointKind::Revolute)
+        });
+        let (angle, compliance) = if turns { ("rad", "rad/(N·m)") } else { ("m", "m/N") };
+        let (magnitude, unit, more): (f64, &str, Vec<(&str, f64)>) = match effect {
+            Effect::JointCompliance { stiffness, .. } => (1.0 / stiffness, compliance, vec![]),
+            Effect::LinkBending { compliance, .. } => (*compliance, "rad/(N·m)", vec![]),
+            Effect::Backlash { width, .. } | Effect::GravityLostMotion { width, .. } => (*width, angle, vec![]),
+            Effect::JointEccentricity { amplitude, order, phase, .. } => {
+                (*amplitude, "rad", vec![("order", f64::from(*order)), ("phase", *phase)])
+            }
+            Effect::StrainWaveError { amplitude, ratio, phase, .. } => {
+                (*amplitude, "rad", vec![("ratio", *ratio), ("phase", *phase)])
+            }
+            Effect::GearCoupling { ratio_error, coupling, source, .. } => {
+                let more = vec![("ratio_error", *ratio_error), ("coupling", *coupling), ("source", *source as f64 + 1.0)];
+                (ratio_error.abs().max(coupling.abs()), "rad/rad", more)
+            }
+            Effect::LinkThermalGrowth { expansion, .. } => (*expansion, "1/K", vec![]),
+            Effect::JointThermalDrift { drift, .. } => (*drift, "rad/K", vec![]),
+            Effect::Clearance { radial, axial, tilt, .. } => {
+                let more = vec![("radial_m", *radial), ("axial_m", *axial), ("tilt_rad", *tilt)];
+                if *radial == 0.0 && *tilt > 0.0 { (*tilt, "rad", more) } else { (*radial, "m", more) }
+            }
+            Effect::BaseDrift { translation, rotation, .. } => {
+                (translation.norm(), "m", vec![("rotation_rad", rotation.norm())])
+            }
+            Effect::BaseStep { translation, rotation, after, .. } | Effect::ToolStep { translation, rotation, after } => {
+                (translation.norm(), "m", vec![("rotation_rad", rotation.norm()), ("after", *after)])
+            }
+            Effect::MeasurementScale { scale } => (*scale, "1", vec![]),
+            Effect::MeasurementOutliers { share, factor } => (*share, "1", vec![("factor", *factor)]),
+            Effect::WornToothSector { depth, centre, half_width, .. } => {
+                (*depth, "rad", vec![("centre", *centre), ("half_width", *half_width)])
+            }
+            Effect::CreepAfterMotion { compliance: creep, time_constant, .. } => {
+                (*creep, compliance, vec![("time_constant_s", *time_constant)])
+            }
+            Effect::MomentCrosstalk { gain, .. } => (*gain, "rad/(N·m)", vec![]),
+            Effect::MemoryHysteresis { amplitude, travel, .. } => (*amplitude, angle, vec![("travel", *travel)]),
+            Effect::WrongPayload { excess, stiffness } => (*excess, "kg", vec![("stiffness", *stiffness)]),
+            Effect::HardeningStiffness { stiffness, cubic, .. } => (1.0 / stiffness, compliance, vec![("cubic", *cubic)]),
+        };
+        TrueEffect {
+            kind: effect.name().to_owned(),
+            level: location.level,
+            number: location.index,
+            magnitude,
+            unit: unit.to_owned(),
+            more: more.into_iter().map(|(name, value)| (name.to_owned(), value)).collect(),
+        }
+    }
 }
 
 /// A parameter's true value.
@@ -56,6 +141,30 @@ pub struct TruePose {
     pub settled: bool,
     /// Where each joint with clearance lies.
     pub seats: Vec<TrueSeat>,
+    /// How far joints and links yield.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub yields: Vec<TrueYield>,
+}
+
+/// Where a coordinate in which a joint or its link yields came to rest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrueYield {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// Name of the effect. Bending has two: about x, then about y of the link.
+    pub effect: String,
+    /// rad, or m where the joint slides.
+    pub value: f64,
+    /// Whether no load decides it: friction holds it.
+    pub by_friction: bool,
+}
+
+impl TrueYield {
+    fn new(of: &Yield) -> Self {
+        let by_friction = of.by == SeatedBy::Friction;
+        TrueYield { joint: of.joint + 1, effect: of.effect.to_owned(), value: of.value, by_friction }
+    }
 }
 
 /// Where a joint lies in its clearance.
@@ -88,6 +197,7 @@ impl TruePose {
             settling_time_s: settled.simulated_time_s,
             settled: settled.converged,
             seats: settled.seats.iter().filter(|seat| has_play(seat)).map(TrueSeat::new).collect(),
+            yields: settled.yields.iter().map(TrueYield::new).collect(),
         }
     }
 }
@@ -140,15 +250,29 @@ pub fn parameters(arm: &Arm, injected: &Injected, public_seed: u64) -> Vec<TrueP
         .collect()
 }
 
-/// Clearance of every joint.
+/// All that happens to the arm, its cell and its sensor.
 #[must_use]
-pub fn clearances(arm: &Arm, injected: &Injected) -> Vec<Clearance> {
-    let mut clearances = vec![Clearance::NONE; arm.joint_count()];
-    for clearance in &injected.clearances {
-        clearances[clearance.joint] =
-            Clearance { radial_m: clearance.radial_m, axial_m: clearance.axial_m, tilt_rad: clearance.tilt_rad };
-    }
-    clearances
+pub fn effects(injected: &Injected) -> Vec<Effect> {
+    let clearances = injected.clearances.iter().map(|clearance| Effect::Clearance {
+        joint: clearance.joint,
+        radial: clearance.radial_m,
+        axial: clearance.axial_m,
+        tilt: clearance.tilt_rad,
+    });
+    let expansion_per_k = injected.thermal.iter().flat_map(|thermal| thermal.expansion_per_k.iter());
+    let foot = expansion_per_k.clone().next().copied().unwrap_or_default();
+    let growth = expansion_per_k.enumerate().filter_map(|(link, expansion)| match link.checked_sub(1) {
+        None => Some(Effect::LinkThermalGrowth { link: None, expansion: *expansion }),
+        link if *expansion != foot => Some(Effect::LinkThermalGrowth { link, expansion: expansion - foot }),
+        _ => None,
+    });
+    clearances.chain(growth).chain(injected.effects.iter().cloned()).collect()
+}
+
+/// What `effects` are, where, and how large.
+#[must_use]
+pub fn described(arm: &Arm, effects: &[Effect]) -> Vec<TrueEffect> {
+    effects.iter().map(|effect| TrueEffect::new(arm, effect)).collect()
 }
 
 /// Rise of every link (base first) over the reference temperature, K, at `share` (0 to 1) of the session.
@@ -163,13 +287,4 @@ pub fn temperature_rise(arm: &Arm, injected: &Injected, share: f64) -> Vec<f64> 
         ThermalProfile::HeatAndCool => libm::sin(std::f64::consts::PI * share),
     };
     thermal.rise_k.iter().map(|rise| rise * course).collect()
-}
-
-/// Growth of every link: 1 + expansion × rise.
-#[must_use]
-pub fn growth(injected: &Injected, rise_k: &[f64]) -> Vec<f64> {
-    match &injected.thermal {
-        Some(thermal) => thermal.expansion_per_k.iter().zip(rise_k).map(|(expansion, rise)| 1.0 + expansion * rise).collect(),
-        None => vec![1.0; rise_k.len()],
-    }
 }

@@ -77,6 +77,7 @@ pub(crate) fn truth_file(file: &crate::scene::SceneFile, truth: &crate::cell::Tr
         seed: file.scene.seed,
         injected,
         parameters: truth.parameters.clone(),
+        effects: truth.effects.clone(),
         poses: truth.poses.clone(),
     })
 }

@@ -43,6 +43,40 @@ pub enum PhysicsError {
         /// Its unit.
         unit: &'static str,
     },
+    /// An effect at a joint or link that the arm does not have.
+    #[error("{effect} is at {what} number {number}, but the arm has {count} joints")]
+    NoSuchPlace {
+        /// The effect's name.
+        effect: &'static str,
+        /// Joint, link or source.
+        what: &'static str,
+        /// From 1.
+        number: usize,
+        /// How many joints there are.
+        count: usize,
+    },
+    /// An effect of turning joints at one that slides.
+    #[error("{effect} is at joint number {}, which slides: this happens to joints that turn", .joint + 1)]
+    Slides {
+        /// The effect's name.
+        effect: &'static str,
+        /// Index of the joint, from 0.
+        joint: usize,
+    },
+    /// A magnitude that no arm has.
+    #[error("the {what} of {effect} at {place} is {got}, expected {expected}")]
+    BadEffect {
+        /// The effect's name.
+        effect: &'static str,
+        /// Where it is.
+        place: String,
+        /// Which of its numbers.
+        what: &'static str,
+        /// The value.
+        got: f64,
+        /// What is allowed.
+        expected: &'static str,
+    },
     /// A number that is not finite.
     #[error("{what} is {got}, expected a finite number")]
     NotFinite {

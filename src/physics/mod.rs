@@ -16,8 +16,12 @@
 //! 7e-8 rad (the latter is second order in the tilt), the one about the middle of the clearances to 0.2 µm and 0.4 µrad.
 
 pub mod clearance;
+pub mod conditions;
 mod convert;
+mod coordinate;
+mod drive_train;
 pub mod error;
+mod mechanisms;
 pub mod physical_arm;
 mod play;
 pub mod settling;
@@ -28,6 +32,7 @@ mod true_arm;
 mod world;
 
 pub use clearance::{Clearance, Seat, SeatedBy};
+pub use conditions::{Conditions, Stop};
 pub use error::PhysicsError;
 pub use physical_arm::PhysicalArm;
-pub use settling::{Settled, Settling, Start};
+pub use settling::{Settled, Settling, Start, Yield};

@@ -1,14 +1,17 @@
 //! The true arm, from commanded joint coordinates to a pose at rest.
 
-use super::clearance::{Clearance, Seat};
+use super::clearance::{Seat, SeatedBy};
+use super::conditions::Conditions;
+use super::coordinate::{Hold, Law, crept, tangent};
 use super::error::PhysicsError;
 use super::play::{Decision, Play};
-use super::settling::{Settled, Settling, Start};
-use super::static_seat::static_seats;
-use super::true_arm::TrueArm;
-use super::world::{TIME_STEP_S, World, indentation};
+use super::settling::{Settled, Settling, Start, Yield};
+use super::static_seat::{static_loads, static_seats};
+use super::true_arm::{Placement, TrueArm};
+use super::world::{TIME_STEP_S, World, Yielded, indentation};
 use crate::arm::Arm;
 use crate::frames::{Pose, rotation_vector};
+use crate::scene::effect::Effect;
 
 /// An arm with its true parameters, as a multibody in rapier.
 pub struct PhysicalArm {
@@ -17,61 +20,133 @@ pub struct PhysicalArm {
     world: World,
 }
 
+/// How many steps a motor takes through the last part of its move where it has play.
+const DRIVE_STEPS: usize = 3;
+
+/// The friction that holds the output of a gear with backlash, relative to the load that it must hold.
+const FRICTION_OVER_LOAD: f64 = 3.0;
+
+/// Creep of which less than this share is left is forgotten.
+const CREPT: f64 = 1e-6;
+
+/// What does not change while one pose settles.
+struct Task {
+    placement: Placement,
+    /// What decides the plays of joints, made once, so that a load near the threshold cannot let a coordinate go and hold it again.
+    decisions: Vec<Decision>,
+    /// The same for each coordinate that yields.
+    by: Vec<SeatedBy>,
+    /// Friction of each coordinate, N·m or N.
+    friction: Vec<f64>,
+    /// Way that the motor still has to go when the simulation begins, for each coordinate: signed, rad or m.
+    ways: Vec<f64>,
+    /// Where each coordinate stood at the end of the move, as far as it creeps.
+    crept: Vec<f64>,
+    dwell_s: f64,
+    /// Outputs of the drive trains before loads are mistaken for torque.
+    outputs: Vec<f64>,
+}
+
 impl PhysicalArm {
-    /// The arm `arm` whose chain has the values `parameters_true` (column order, SI) and whose joints have the `clearances` (one
-    /// per joint).
+    /// The arm `arm` whose chain has the values `parameters_true` (column order, SI) and to which `effects` happen. What a sensor
+    /// does to its readings is not the arm's, and ignored.
     ///
     /// # Errors
-    /// If a moving link has no inertial or an impossible one, a count is wrong, or a number is out of range.
-    pub fn new(arm: &Arm, parameters_true: &[f64], clearances: &[Clearance], settling: Settling) -> Result<Self, PhysicsError> {
+    /// If a moving link has no inertial or an impossible one, a count is wrong, an effect is where the arm has no joint, or a number
+    /// is out of range.
+    pub fn new(arm: &Arm, parameters_true: &[f64], effects: &[Effect], settling: Settling) -> Result<Self, PhysicsError> {
         settling.check()?;
-        let arm = TrueArm::new(arm, parameters_true, clearances, settling.holding_ratio)?;
+        let arm = TrueArm::new(arm, parameters_true, effects, settling.holding_ratio)?;
         let world = World::new(&arm);
         Ok(PhysicalArm { arm, settling, world })
     }
 
-    /// Moves the joints to `joints` (rad or m, ideal servos), lets the arm settle and returns its pose.
+    /// Moves the joints as `conditions` say, lets the arm settle and returns its pose.
     ///
-    /// `growth[i]` scales the translation from joint `i` to joint `i + 1` (counted from 1; `growth[0]` is base to first joint,
-    /// the last is last joint to tool): `1 + α ΔT` of link `i`, 1 without thermal growth. Centres of mass do not move with it.
+    /// A link's growth scales the translation from its joint to the next; centres of mass do not move with it.
     ///
     /// The result depends on the arguments alone, to the last bit, not on what was settled before.
     ///
     /// # Panics
-    /// If there is not one coordinate per joint and one growth per segment.
-    pub fn settle(&mut self, joints: &[f64], growth: &[f64]) -> Settled {
+    /// If there is not one coordinate per joint, or one temperature per link.
+    pub fn settle(&mut self, conditions: &Conditions) -> Settled {
         let count = self.arm.joint_count();
-        assert_eq!(joints.len(), count, "one coordinate per joint");
-        assert_eq!(growth.len(), count + 1, "one growth per segment");
+        assert_eq!(conditions.joints.len(), count, "one coordinate per joint");
+        assert_eq!(conditions.from.len(), count, "one coordinate per joint");
+        assert_eq!(conditions.rise_k.len(), count + 1, "one temperature per link");
+        let mut placement = self.arm.placement(conditions);
+        let outputs = placement.joints.clone();
         let mut plays = vec![Play::CENTRE; count];
-        self.world.place(&self.arm, joints, growth, &plays);
+        let mut coordinates = vec![0.0; self.arm.coordinates.len()];
+        let crept = self.crept(conditions);
+        let first = self.holds(&coordinates, &[], &crept, conditions.dwell_s, 0);
+        self.world.place(&self.arm, &placement, &Yielded { plays: &plays, coordinates: &coordinates, holds: &first });
+        let crosstalk = self.arm.drives.iter().any(|drive| drive.crosstalk != 0.0);
+        if crosstalk {
+            self.mistake_moments(&outputs, &mut placement);
+            self.world.place(&self.arm, &placement, &Yielded { plays: &plays, coordinates: &coordinates, holds: &first });
+        }
         let mut loads = self.world.loads();
-        // Made once, so that a load near the threshold cannot let a coordinate go and hold it again half-way.
+        let mut turning = self.world.coordinate_loads();
         let decisions = self.arm.decisions(&loads);
+        let by = self.decided(&turning);
+        let friction = self.friction(&turning);
+        let mut task = Task {
+            placement,
+            decisions,
+            by,
+            friction,
+            ways: vec![0.0; coordinates.len()],
+            crept,
+            dwell_s: conditions.dwell_s,
+            outputs,
+        };
+        (task.ways, coordinates) = self.before_the_move(conditions);
         if self.settling.start == Start::Predicted && self.world.freedoms() > 0 {
-            plays = self.predicted(joints, growth, &decisions);
-            self.world.place(&self.arm, joints, growth, &plays);
+            plays = self.predicted(&task);
+        }
+        let drives = task.ways.iter().any(|way| *way != 0.0);
+        let least = if drives { DRIVE_STEPS + 1 } else { 1 };
+        if self.world.freedoms() > 0 {
+            self.put(&task, &plays, &coordinates, 0);
             loads = self.world.loads();
+            turning = self.world.coordinate_loads();
         }
         let mut base_from_tool = self.world.base_from_tool();
         let (mut steps, mut moved_m, mut moved_rad) = (0, 0.0, 0.0);
-        let mut converged = self.world.freedoms() == 0;
-        while !converged && steps < self.settling.steps_max {
-            self.world.damp(&self.arm, &loads, &decisions);
-            self.world.step();
+        let mut converged = self.world.freedoms() == 0 && !crosstalk;
+        while !converged && steps < self.settling.steps_max.max(least) {
+            if self.world.freedoms() > 0 {
+                self.world.damp(&self.arm, &loads, &task.decisions);
+                self.world.damp_coordinates(&self.arm, &turning, &task.by, &task.friction);
+                self.world.step();
+                plays = self.world.plays();
+                coordinates = self.world.coordinates();
+            }
+            if crosstalk {
+                self.mistake_moments(&task.outputs, &mut task.placement);
+            }
             steps += 1;
-            plays = self.world.plays();
-            self.world.place(&self.arm, joints, growth, &plays);
+            self.put(&task, &plays, &coordinates, steps);
             loads = self.world.loads();
+            turning = self.world.coordinate_loads();
             let reached = self.world.base_from_tool();
             (moved_m, moved_rad) = distance(&reached, &base_from_tool);
             base_from_tool = reached;
-            converged = moved_m < self.settling.tolerance_m && moved_rad < self.settling.tolerance_rad;
+            converged =
+                steps >= least && moved_m < self.settling.tolerance_m && moved_rad < self.settling.tolerance_rad;
         }
-        let base_from_link = std::iter::once(self.arm.base_from_base_link)
+        let standing = task.placement.base_shift.map_or(self.arm.base_from_base_link, |shift| shift * self.arm.base_from_base_link);
+        let base_from_link = std::iter::once(standing)
             .chain((0..count).map(|joint| self.world.base_from_link(joint) * self.arm.joint_from_link[joint]))
             .collect();
-        let seats = plays.iter().zip(&decisions).enumerate().map(|(joint, (play, by))| seat(joint, play, by)).collect();
+        let seats = plays.iter().zip(&task.decisions).enumerate().map(|(joint, (play, by))| seat(joint, play, by)).collect();
+        let yields = self.arm.coordinates.iter().zip(coordinates.iter().zip(&task.by)).map(|(coordinate, (value, by))| Yield {
+            joint: coordinate.joint,
+            effect: coordinate.law.name(coordinate.direction),
+            value: *value,
+            by: *by,
+        });
         Settled {
             base_from_tool,
             base_from_link,
@@ -81,12 +156,113 @@ impl PhysicalArm {
             simulated_time_s: steps as f64 * TIME_STEP_S,
             converged,
             seats,
+            yields: yields.collect(),
         }
     }
 
+    /// Puts everything where `task` wants it after `steps` steps.
+    fn put(&mut self, task: &Task, plays: &[Play], coordinates: &[f64], steps: usize) {
+        let holds = self.holds(coordinates, &task.ways, &task.crept, task.dwell_s, steps + 1);
+        self.world.place(&self.arm, &task.placement, &Yielded { plays, coordinates, holds: &holds });
+    }
+
+    /// What holds each coordinate during step number `step`, from 1: a motor has then gone that part of its way.
+    fn holds(&self, coordinates: &[f64], ways: &[f64], crept_to: &[f64], dwell_s: f64, step: usize) -> Vec<Hold> {
+        let hold = |(index, coordinate): (usize, &super::coordinate::Coordinate)| match coordinate.law {
+            Law::Spring { stiffness } => Hold::Spring { stiffness, rest: 0.0 },
+            Law::Hardening { stiffness, cubic } => tangent(stiffness, cubic, coordinates[index]),
+            Law::Creep { compliance, time_constant } => crept(compliance, time_constant, crept_to[index], dwell_s),
+            Law::LostMotion { half_width } => Hold::Between { lower: -half_width, upper: half_width },
+            Law::Backlash { half_width } => {
+                let left = 1.0 - step.min(DRIVE_STEPS) as f64 / DRIVE_STEPS as f64;
+                let motor = -ways.get(index).copied().unwrap_or(0.0) * left;
+                Hold::Between { lower: motor - half_width, upper: motor + half_width }
+            }
+        };
+        self.arm.coordinates.iter().enumerate().map(hold).collect()
+    }
+
+    /// Turns each joint further by what its servo takes for a torque error.
+    fn mistake_moments(&self, outputs: &[f64], placement: &mut Placement) {
+        for (joint, drive) in self.arm.drives.iter().enumerate().filter(|(_, drive)| drive.crosstalk != 0.0) {
+            placement.joints[joint] = outputs[joint] + drive.crosstalk * self.world.moment_across(&self.arm, joint);
+        }
+    }
+
+    /// What decides where each coordinate rests under the loads `turning`.
+    fn decided(&self, turning: &[f64]) -> Vec<SeatedBy> {
+        let by = |(coordinate, load): (&super::coordinate::Coordinate, &f64)| match coordinate.law {
+            Law::Backlash { .. } => SeatedBy::Friction,
+            Law::LostMotion { .. } if load.abs() < self.arm.turn_holding(coordinate.joint) => SeatedBy::Friction,
+            _ => SeatedBy::Load,
+        };
+        self.arm.coordinates.iter().zip(turning).map(by).collect()
+    }
+
+    /// The friction of each coordinate: more than gravity can overcome, as gears with friction are.
+    fn friction(&self, turning: &[f64]) -> Vec<f64> {
+        let friction = |(coordinate, load): (&super::coordinate::Coordinate, &f64)| match coordinate.law {
+            Law::Backlash { .. } => FRICTION_OVER_LOAD * load.abs() + self.arm.turn_friction(coordinate.joint),
+            _ => 0.0,
+        };
+        self.arm.coordinates.iter().zip(turning).map(friction).collect()
+    }
+
+    /// The way that the motor of each coordinate with backlash still has to go when the simulation begins, and where each coordinate
+    /// then is. Only the last part of a move counts: from there on the output is pushed, wherever in the play it was.
+    fn before_the_move(&self, conditions: &Conditions) -> (Vec<f64>, Vec<f64>) {
+        let before = |coordinate: &super::coordinate::Coordinate| match coordinate.law {
+            Law::Backlash { half_width } => {
+                let moves = conditions.moves_backwards(coordinate.joint);
+                let last = conditions.joints[coordinate.joint] - conditions.from[coordinate.joint];
+                let way = last.clamp(-4.0 * half_width, 4.0 * half_width);
+                // If the whole move is shorter than the play, what was before it decides.
+                let seat = if way == last { seat_before(moves.skip(1), half_width) } else { 0.0 };
+                (way, seat - way)
+            }
+            _ => (0.0, 0.0),
+        };
+        self.arm.coordinates.iter().map(before).unzip()
+    }
+
+    /// Where each coordinate that creeps stood at the end of the last move, after all that was before it in the session: at its
+    /// beginning nothing has crept. Each stop is exact for its own load, without play; moves take no time.
+    fn crept(&self, conditions: &Conditions) -> Vec<f64> {
+        let arrival = conditions.time_s - conditions.dwell_s;
+        let creeps = |coordinate: &super::coordinate::Coordinate| {
+            let Law::Creep { compliance, time_constant } = coordinate.law else {
+                return 0.0;
+            };
+            let (mut state, mut kept, mut until_s) = (0.0, 1.0, arrival);
+            for (index, stop) in conditions.history.iter().enumerate().rev() {
+                let from_s = stop.time_s - stop.dwell_s;
+                let earlier = Conditions {
+                    joints: stop.joints,
+                    from: stop.from,
+                    payload_kg: stop.payload_kg,
+                    time_s: stop.time_s,
+                    dwell_s: stop.dwell_s,
+                    history: &conditions.history[..index],
+                    ..*conditions
+                };
+                let faded = libm::exp(-(until_s - from_s).max(0.0) / time_constant);
+                let plays = vec![Play::CENTRE; self.arm.joint_count()];
+                let loads = static_loads(&self.arm, &self.arm.placement(&earlier), &plays);
+                state += kept * (1.0 - faded) * compliance * loads[coordinate.joint].along;
+                kept *= faded;
+                until_s = from_s;
+                if kept < CREPT {
+                    break;
+                }
+            }
+            state
+        };
+        self.arm.coordinates.iter().map(creeps).collect()
+    }
+
     /// Where statics puts the joints, pressed against the limits as rapier holds them.
-    fn predicted(&self, joints: &[f64], growth: &[f64], decisions: &[Decision]) -> Vec<Play> {
-        let mut plays = static_seats(&self.arm, joints, growth, decisions, 2);
+    fn predicted(&self, task: &Task) -> Vec<Play> {
+        let mut plays = static_seats(&self.arm, &task.placement, &task.decisions, 2);
         for play in &mut plays {
             play.radial *= indentation();
             play.axial *= indentation();
@@ -94,6 +270,19 @@ impl PhysicalArm {
         }
         plays
     }
+}
+
+/// Where the output lies in a play of `half_width` after the moves `backwards` (newest first; the middle before the first of them).
+fn seat_before(backwards: impl Iterator<Item = (f64, f64)>, half_width: f64) -> f64 {
+    let mut moves = Vec::new();
+    for (from, to) in backwards {
+        moves.push(to - from);
+        // Whatever was before, this one has pushed the output along.
+        if (to - from).abs() >= 2.0 * half_width {
+            break;
+        }
+    }
+    moves.iter().rev().fold(0.0, |seat: f64, moved| (seat - moved).clamp(-half_width, half_width))
 }
 
 fn seat(joint: usize, play: &Play, by: &Decision) -> Seat {
@@ -116,7 +305,7 @@ fn distance(reached: &Pose, left: &Pose) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::clearance::{LARGEST_LENGTH_M, LARGEST_TILT_RAD, SeatedBy};
+    use super::super::clearance::{Clearance, LARGEST_LENGTH_M, LARGEST_TILT_RAD, SeatedBy};
     use super::super::static_seat::{seats_about, static_loads};
     use super::super::test_arms;
     use super::*;
@@ -124,6 +313,34 @@ mod tests {
     use crate::kinematics::JointKind;
     use crate::seed::{Stream, stream};
     use nalgebra::{Translation3, Vector2};
+
+    /// Expansion of every link in these tests, 1/K.
+    const EXPANSION: f64 = 1e-5;
+
+    /// Clearances of the joints, and links that grow.
+    fn effects(clearances: &[Clearance]) -> Vec<Effect> {
+        let growth = [Effect::LinkThermalGrowth { link: None, expansion: EXPANSION }];
+        let of = |(joint, clearance): (usize, &Clearance)| Effect::Clearance {
+            joint,
+            radial: clearance.radial_m,
+            axial: clearance.axial_m,
+            tilt: clearance.tilt_rad,
+        };
+        growth.into_iter().chain(clearances.iter().enumerate().map(of)).collect()
+    }
+
+    fn rises(growth: &[f64]) -> Vec<f64> {
+        growth.iter().map(|growth| (growth - 1.0) / EXPANSION).collect()
+    }
+
+    /// Settles at `joints` with links that have grown by `growth`.
+    fn settle(physical: &mut PhysicalArm, joints: &[f64], growth: &[f64]) -> Settled {
+        physical.settle(&Conditions::still(joints, &rises(growth)))
+    }
+
+    fn placement(arm: &TrueArm, joints: &[f64], growth: &[f64]) -> Placement {
+        arm.placement(&Conditions::still(joints, &rises(growth)))
+    }
 
     #[test]
     fn without_effects_it_is_forward_kinematics() {
@@ -155,11 +372,11 @@ mod tests {
                     };
                 }
             }
-            let mut physical = PhysicalArm::new(&arm, &parameters, &[Clearance::NONE; 8], Settling::default()).unwrap();
-            let settled = physical.settle(&joints, &growth);
+            let mut physical = PhysicalArm::new(&arm, &parameters, &effects(&[]), Settling::default()).unwrap();
+            let settled = settle(&mut physical, &joints, &growth);
             worst = worst.max(pose_error(&settled.base_from_tool, &expected).amax());
             assert!(settled.converged && settled.steps == 0);
-            let still = physical.settle(&joints, &[1.0; 9]);
+            let still = settle(&mut physical, &joints, &[1.0; 9]);
             worst = worst.max(pose_error(&still.base_from_tool, &at.forward(&joints)).amax());
             for (link, name) in arm.links.iter().zip(&still.base_from_link) {
                 let frame = arm.chain.frame_names().iter().position(|frame| *frame == link.name).unwrap();
@@ -212,17 +429,18 @@ mod tests {
                 let joints = test_arms::configuration(&arm, &mut stream);
                 let growth = test_arms::growth(&arm, &mut stream);
                 let settling = Settling { start: Start::Centre, ..Settling::default() };
-                let settled = PhysicalArm::new(&arm, &parameters, &clearances, settling).unwrap().settle(&joints, &growth);
+                let settled = settle(&mut PhysicalArm::new(&arm, &parameters, &effects(&clearances), settling).unwrap(), &joints, &growth);
                 assert!(settled.converged);
                 steps = steps.max(settled.steps);
                 steps_all += settled.steps;
                 error_m = error_m.max(settled.settling_error_m);
                 error_rad = error_rad.max(settled.settling_error_rad);
                 // The oracle holds nothing: every load decides.
-                let oracle = TrueArm::new(&arm, &parameters, &clearances, 1e-12).unwrap();
-                let all = oracle.decisions(&static_loads(&oracle, &joints, &growth, &[Play::CENTRE; 8]));
-                let first = static_seats(&oracle, &joints, &growth, &all, 1);
-                let last = seats_about(&oracle, &joints, &growth, &all, &plays(&settled));
+                let oracle = TrueArm::new(&arm, &parameters, &effects(&clearances), 1e-12).unwrap();
+                let placed = placement(&oracle, &joints, &growth);
+                let all = oracle.decisions(&static_loads(&oracle, &placed, &[Play::CENTRE; 8]));
+                let first = static_seats(&oracle, &placed, &all, 1);
+                let last = seats_about(&oracle, &placed, &all, &plays(&settled));
                 for (seat, (first, last)) in settled.seats.iter().zip(first.iter().zip(&last)) {
                     let mut compare = |by, ours: Vector2<f64>, first: Vector2<f64>, last: Vector2<f64>, tilt| match by {
                         SeatedBy::Fit => assert_eq!(ours, Vector2::zeros()),
@@ -265,7 +483,7 @@ mod tests {
             let clearances = fractions(KINDS[3].1, &mut stream);
             let joints = test_arms::configuration(&arm, &mut stream);
             let settling = Settling { start: Start::Centre, ..Settling::default() };
-            let settled = PhysicalArm::new(&arm, &parameters, &clearances, settling).unwrap().settle(&joints, &[1.0; 9]);
+            let settled = settle(&mut PhysicalArm::new(&arm, &parameters, &effects(&clearances), settling).unwrap(), &joints, &[1.0; 9]);
             let segments = arm.chain.at(&parameters).segments();
             let energy = |plays: &[Play]| {
                 let mut base_from_link = Pose::identity();
@@ -327,8 +545,8 @@ mod tests {
         let clearances = fractions(KINDS[3].1, &mut stream);
         let configurations: Vec<Vec<f64>> = (0..20).map(|_| test_arms::configuration(&arm, &mut stream)).collect();
         for start in [Start::Centre, Start::Predicted] {
-            let fresh = || PhysicalArm::new(&arm, &parameters, &clearances, Settling { start, ..Settling::default() }).unwrap();
-            let settle = |physical: &mut PhysicalArm, joints: &Vec<f64>| bits(&physical.settle(joints, &[1.0; 9]));
+            let fresh = || PhysicalArm::new(&arm, &parameters, &effects(&clearances), Settling { start, ..Settling::default() }).unwrap();
+            let settle = |physical: &mut PhysicalArm, joints: &Vec<f64>| bits(&settle(physical, joints, &[1.0; 9]));
             let alone: Vec<_> = configurations.iter().map(|joints| settle(&mut fresh(), joints)).collect();
             let mut used = fresh();
             let in_order: Vec<_> = configurations.iter().map(|joints| settle(&mut used, joints)).collect();
@@ -357,7 +575,7 @@ mod tests {
             let clearances = fractions(KINDS[3].1, &mut stream);
             let joints = test_arms::configuration(&arm, &mut stream);
             let settle =
-                |settling| PhysicalArm::new(&arm, &parameters, &clearances, settling).unwrap().settle(&joints, &[1.0; 9]);
+                |settling| settle(&mut PhysicalArm::new(&arm, &parameters, &effects(&clearances), settling).unwrap(), &joints, &[1.0; 9]);
             let rest = settle(Settling { tolerance_m: 1e-13, tolerance_rad: 1e-13, ..Settling::default() });
             assert!(rest.converged);
             for (start, steps_max) in [(Start::Centre, 2), (Start::Centre, 3), (Start::Predicted, 1), (Start::Predicted, 50)] {
@@ -384,7 +602,7 @@ mod tests {
             let joints = test_arms::configuration(&arm, &mut stream);
             let settled = |start| {
                 let settling = Settling { start, ..Settling::default() };
-                let settled = PhysicalArm::new(&arm, &parameters, &[largest; 8], settling).unwrap().settle(&joints, &[1.0; 9]);
+                let settled = settle(&mut PhysicalArm::new(&arm, &parameters, &effects(&[largest; 8]), settling).unwrap(), &joints, &[1.0; 9]);
                 assert!(settled.converged && settled.steps < 20, "{} steps", settled.steps);
                 for seat in settled.seats.iter().filter(|seat| seat.radial_by == SeatedBy::Load) {
                     let reached = Vector2::from(seat.radial_in_joint).norm() / largest.radial_m;
@@ -403,7 +621,7 @@ mod tests {
         let clearance = Clearance { radial_m: 30e-6, axial_m: 20e-6, tilt_rad: 100e-6 };
         let nominal = arm.chain.nominal();
         let settled =
-            PhysicalArm::new(&arm, &nominal, &[clearance; 8], Settling::default()).unwrap().settle(&[0.5; 8], &[1.0; 9]);
+            settle(&mut PhysicalArm::new(&arm, &nominal, &effects(&[clearance; 8]), Settling::default()).unwrap(), &[0.5; 8], &[1.0; 9]);
         assert!(settled.converged);
         assert!(pose_error(&settled.base_from_tool, &arm.chain.at_nominal().forward(&[0.5; 8])).amax() < 1e-14);
         assert!(settled.seats.iter().all(|seat| seat.radial_by == SeatedBy::Friction && seat.tilt_by == SeatedBy::Friction));
@@ -418,8 +636,8 @@ mod tests {
         clearances[0] = clearance;
         for start in [Start::Centre, Start::Predicted] {
             let settling = Settling { start, ..Settling::default() };
-            let mut physical = PhysicalArm::new(&arm, &arm.chain.nominal(), &clearances, settling).unwrap();
-            let settled = physical.settle(&[0.3, 0.8, -0.5, 1.0, 0.2, -0.4, 0.1, 0.6], &[1.0; 9]);
+            let mut physical = PhysicalArm::new(&arm, &arm.chain.nominal(), &effects(&clearances), settling).unwrap();
+            let settled = settle(&mut physical, &[0.3, 0.8, -0.5, 1.0, 0.2, -0.4, 0.1, 0.6], &[1.0; 9]);
             let seat = settled.seats[0];
             assert!(settled.converged);
             assert_eq!((seat.radial_by, seat.axial_by, seat.tilt_by), (SeatedBy::Friction, SeatedBy::Load, SeatedBy::Load));
@@ -444,7 +662,7 @@ mod tests {
         let clearance = Clearance { radial_m: c, axial_m: 25e-6, tilt_rad: gamma };
         for q in [0.0, 1.0, -2.0] {
             let settling = Settling { start: Start::Centre, ..Settling::default() };
-            let settled = PhysicalArm::new(&arm, &arm.chain.nominal(), &[clearance], settling).unwrap().settle(&[q], &[1.0; 2]);
+            let settled = settle(&mut PhysicalArm::new(&arm, &arm.chain.nominal(), &effects(&[clearance]), settling).unwrap(), &[q], &[1.0; 2]);
             let seat = settled.seats[0];
             assert_eq!((seat.radial_by, seat.axial_by, seat.tilt_by), (SeatedBy::Load, SeatedBy::Friction, SeatedBy::Load));
             let tool = settled.base_from_tool.translation.vector;
@@ -474,7 +692,7 @@ mod tests {
         let clearance = Clearance { radial_m: c, axial_m: 25e-6, tilt_rad: gamma };
         for q in [0.0, 1.0, -2.0] {
             let settling = Settling { start: Start::Centre, ..Settling::default() };
-            let settled = PhysicalArm::new(&arm, &parameters, &[clearance], settling).unwrap().settle(&[q], &[1.0; 2]);
+            let settled = settle(&mut PhysicalArm::new(&arm, &parameters, &effects(&[clearance]), settling).unwrap(), &[q], &[1.0; 2]);
             let seat = settled.seats[0];
             // The joint's frame has x along base x, y down, z along base y; nothing pushes along the axis.
             assert_eq!((seat.radial_by, seat.axial_by, seat.tilt_by), (SeatedBy::Load, SeatedBy::Friction, SeatedBy::Load));
@@ -491,13 +709,13 @@ mod tests {
         let arm = test_arms::eight();
         let nominal = arm.chain.nominal();
         let new =
-            |arm: &Arm, clearances: &[Clearance], settling| PhysicalArm::new(arm, &nominal, clearances, settling).err().unwrap();
+            |arm: &Arm, clearances: &[Clearance], settling| PhysicalArm::new(arm, &nominal, &effects(clearances), settling).err().unwrap();
         let mut bare = arm.clone();
         bare.links[3].inertial = None;
         let error = new(&bare, &[Clearance::NONE; 8], Settling::default());
         assert_eq!(error, PhysicsError::MissingInertial { link: "link3".to_owned() });
-        let error = new(&arm, &[Clearance::NONE; 7], Settling::default());
-        assert_eq!(error.to_string(), "7 clearances, expected 8");
+        let error = new(&arm, &[Clearance { radial_m: 1e-6, ..Clearance::NONE }; 9], Settling::default());
+        assert_eq!(error.to_string(), "clearance is at joint number 9, but the arm has 8 joints");
         let error = new(&arm, &[Clearance { radial_m: -1e-6, ..Clearance::NONE }; 8], Settling::default());
         assert_eq!(error.to_string(), "radial clearance of joint number 1 is -0.000001, allowed is 0 to 0.001 (m)");
         let error = new(&arm, &[Clearance::NONE; 8], Settling { tolerance_m: f64::NAN, ..Settling::default() });

@@ -38,6 +38,8 @@ pub(super) struct Load {
     pub(super) axial: f64,
     /// N·m.
     pub(super) tilt: Vector2<f64>,
+    /// What drives the joint itself: the torque about its axis, N·m, or the force along it, N.
+    pub(super) along: f64,
 }
 
 /// What decides where the coordinates of one joint's play come to rest.

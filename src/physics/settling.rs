@@ -1,6 +1,6 @@
 //! How a pose is waited for, and what comes out.
 
-use super::clearance::Seat;
+use super::clearance::{Seat, SeatedBy};
 use super::error::PhysicsError;
 use crate::frames::Pose;
 
@@ -68,7 +68,7 @@ pub struct Settled {
     pub settling_error_m: f64,
     /// The same for its attitude, rad.
     pub settling_error_rad: f64,
-    /// Simulated steps; none if no joint has clearance.
+    /// Simulated steps; none if nothing in the arm yields or has play.
     pub steps: usize,
     /// Simulated time, s. Long, as damping is chosen to outweigh inertia: how a pose is reached is not modelled.
     pub simulated_time_s: f64,
@@ -76,4 +76,19 @@ pub struct Settled {
     pub converged: bool,
     /// Where each joint lies in its clearance.
     pub seats: Vec<Seat>,
+    /// How far joints and links yield.
+    pub yields: Vec<Yield>,
+}
+
+/// Where a coordinate in which a joint or its link yields came to rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Yield {
+    /// Index of the joint.
+    pub joint: usize,
+    /// Name of the effect. Bending has two coordinates: about x, then about y of the link.
+    pub effect: &'static str,
+    /// rad, or m where the joint slides.
+    pub value: f64,
+    /// What decides it; friction means the middle of the play for lost motion, and where the motor left it for backlash.
+    pub by: SeatedBy,
 }

@@ -3,11 +3,16 @@
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 use super::clearance::{Clearance, SeatedBy};
+use super::conditions::Conditions;
+use super::coordinate::Coordinate;
+use super::drive_train::Drive;
 use super::error::PhysicsError;
+use super::mechanisms::{Mechanisms, Shift, shifted};
 use super::play::{Decision, Load};
 use crate::arm::{Arm, Inertial};
 use crate::frames::Pose;
 use crate::kinematics::{JointKind, Step};
+use crate::scene::effect::Effect;
 
 /// Segments, masses and clearances of the arm with its true parameters.
 #[derive(Clone, Debug)]
@@ -18,6 +23,16 @@ pub(super) struct TrueArm {
     pub(super) kinds: Vec<JointKind>,
     /// Play of each joint.
     pub(super) clearances: Vec<Clearance>,
+    /// Drive train of each joint.
+    pub(super) drives: Vec<Drive>,
+    /// Coordinates that yield, from the base outwards.
+    pub(super) coordinates: Vec<Coordinate>,
+    /// Expansion of each link, base link first, 1/K.
+    expansion_per_k: Vec<f64>,
+    base_shifts: Vec<Shift>,
+    tool_shifts: Vec<Shift>,
+    /// Mass that the tool carries beyond what is believed, kg.
+    pub(super) excess_kg: f64,
     /// Mass distribution of the link that each joint moves, in the frame after the joint's motion.
     pub(super) inertials: Vec<Inertial>,
     /// Pose of that link's frame in the frame after the joint's motion: turned where a URDF's axis is not z.
@@ -28,6 +43,21 @@ pub(super) struct TrueArm {
     pub(super) base_from_base_link: Pose,
     /// Below these loads a joint's coordinates do not move.
     pub(super) holding: Vec<Holding>,
+}
+
+/// Where an arm is to be, but for what yields.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Placement {
+    /// Outputs of the drive trains, rad or m.
+    pub(super) joints: Vec<f64>,
+    /// Growth of each segment, base to first joint first; 1 where nothing grows.
+    pub(super) growth: Vec<f64>,
+    /// `world_from_base`: where the base has moved to.
+    pub(super) base_shift: Option<Pose>,
+    /// Where the tool has moved to on its link.
+    pub(super) tool_shift: Option<Pose>,
+    /// Mass at the tool's origin, kg.
+    pub(super) payload_kg: f64,
 }
 
 /// Loads below which the friction of a fit keeps it where it is.
@@ -42,16 +72,18 @@ pub(super) struct Holding {
 /// Rounding leaves about 1e-14 N on an axis without load; nothing real is this small.
 const SMALLEST_HOLDING: f64 = 1e-9;
 
+/// Threshold of gravity-seated lost motion over the friction of the fits.
+const LOST_MOTION_SHARE: f64 = 2e-3;
+
 impl TrueArm {
     pub(super) fn new(
         arm: &Arm,
         parameters_true: &[f64],
-        clearances: &[Clearance],
+        effects: &[Effect],
         holding_ratio: f64,
     ) -> Result<Self, PhysicsError> {
         let count = arm.joint_count();
         check_count("true parameters", parameters_true.len(), arm.chain.parameters.len())?;
-        check_count("clearances", clearances.len(), count)?;
         check_count("links (one per joint, and the base)", arm.links.len(), count + 1)?;
         for (parameter, value) in arm.chain.parameters.iter().zip(parameters_true) {
             check_finite(|| format!("true parameter `{}`", parameter.name), *value)?;
@@ -59,9 +91,8 @@ impl TrueArm {
         for component in &arm.gravity_in_base {
             check_finite(|| "gravity".to_owned(), *component)?;
         }
-        for (joint, clearance) in clearances.iter().enumerate() {
-            clearance.check(joint)?;
-        }
+        let kinds: Vec<JointKind> = arm.chain.joints.iter().map(|joint| joint.kind).collect();
+        let parts = Mechanisms::new(&kinds, effects)?;
         let joint_from_link: Vec<Pose> = (0..count).map(|joint| joint_from_link(arm, joint)).collect();
         let inertials = (arm.links[1..].iter().zip(&joint_from_link))
             .map(|(link, joint_from_link)| checked_inertial(link).map(|inertial| moved(inertial, joint_from_link)))
@@ -83,8 +114,14 @@ impl TrueArm {
             .collect();
         Ok(TrueArm {
             segments,
-            kinds: arm.chain.joints.iter().map(|joint| joint.kind).collect(),
-            clearances: clearances.to_vec(),
+            kinds,
+            clearances: parts.clearances,
+            drives: parts.drives,
+            coordinates: parts.coordinates,
+            expansion_per_k: parts.expansion_per_k,
+            base_shifts: parts.base_shifts,
+            tool_shifts: parts.tool_shifts,
+            excess_kg: parts.excess_kg,
             inertials,
             joint_from_link,
             gravity_in_base: arm.gravity_in_base,
@@ -97,15 +134,49 @@ impl TrueArm {
         self.kinds.len()
     }
 
-    /// Segment `index` when the link it is on has grown by the factor `growth[index]`.
-    pub(super) fn grown_segment(&self, index: usize, growth: &[f64]) -> Pose {
-        let grown =
-            |segment: &Pose| Pose::from_parts(Translation3::from(segment.translation.vector * growth[index]), segment.rotation);
-        if index == 0 {
-            // Where the arm stands in the cell is no link: only the foot grows.
-            return self.base_from_base_link * grown(&(self.base_from_base_link.inverse() * self.segments[0]));
+    /// Where the arm is to be under `conditions`, no load acting on it.
+    pub(super) fn placement(&self, conditions: &Conditions) -> Placement {
+        let share = conditions.share();
+        Placement {
+            joints: self.drives.iter().enumerate().map(|(joint, drive)| drive.output(joint, conditions)).collect(),
+            growth: self.expansion_per_k.iter().zip(conditions.rise_k).map(|(per_k, rise)| 1.0 + per_k * rise).collect(),
+            base_shift: shifted(&self.base_shifts, share),
+            tool_shift: shifted(&self.tool_shifts, share),
+            // Less than nothing hangs on no tool.
+            payload_kg: (conditions.payload_kg + self.excess_kg).max(0.0),
         }
-        grown(&self.segments[index])
+    }
+
+    /// Segment `index`, grown with the link it is on; the base and the tool where they have moved to.
+    pub(super) fn segment(&self, index: usize, placement: &Placement) -> Pose {
+        let growth = placement.growth[index];
+        let grown = |segment: &Pose| Pose::from_parts(Translation3::from(segment.translation.vector * growth), segment.rotation);
+        let mut segment = if index == 0 {
+            // Where the arm stands in the cell is no link: only the foot grows.
+            self.base_from_base_link * grown(&(self.base_from_base_link.inverse() * self.segments[0]))
+        } else {
+            grown(&self.segments[index])
+        };
+        if let (0, Some(world_from_base)) = (index, &placement.base_shift) {
+            segment = world_from_base * segment;
+        }
+        if let (true, Some(shift)) = (index == self.joint_count(), &placement.tool_shift) {
+            segment *= shift;
+        }
+        segment
+    }
+
+    /// The load about the axis of joint `joint` (along it where it slides) below which a play that gravity seats stays in its middle,
+    /// N·m or N: as little as keeps a step across the play quasi-static.
+    pub(super) fn turn_holding(&self, joint: usize) -> f64 {
+        let holding = self.turn_friction(joint);
+        (holding * LOST_MOTION_SHARE).max(SMALLEST_HOLDING)
+    }
+
+    /// The friction of a drive train that a load well below what it was built for does not overcome, N·m or N.
+    pub(super) fn turn_friction(&self, joint: usize) -> f64 {
+        let holding = self.holding[joint];
+        if self.kinds[joint] == JointKind::Revolute { holding.moment } else { holding.force }
     }
 
     /// The motions of joint `joint` at coordinate `q`: inboard of its play, and outboard of it.

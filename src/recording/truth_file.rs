@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::cell::Truth;
-use crate::cell::truth::{TrueParameter, TruePose};
+use crate::cell::truth::{TrueEffect, TrueParameter, TruePose};
 
 /// The file as it stands: TOML, the scene's `[injected]` section first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -21,6 +21,9 @@ pub struct TruthFile {
     pub injected: toml::Table,
     /// What was drawn.
     pub parameters: Vec<TrueParameter>,
+    /// What happens to the arm, its cell and its sensor besides.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<TrueEffect>,
     /// What the physics made of it.
     pub poses: Vec<TruePose>,
 }
@@ -58,7 +61,7 @@ impl TruthFile {
     /// The truth in it.
     #[must_use]
     pub fn truth(self) -> Truth {
-        Truth { parameters: self.parameters, poses: self.poses }
+        Truth { parameters: self.parameters, effects: self.effects, poses: self.poses }
     }
 
     /// Writes the file at once: under another name first, so that no half of it is ever seen.

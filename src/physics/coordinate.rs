@@ -1,0 +1,73 @@
+//! Coordinates in which a joint or its link yields, each one axis of the multibody with a law of its own.
+
+/// A coordinate outboard of the joint's motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Coordinate {
+    pub(super) joint: usize,
+    pub(super) direction: Direction,
+    pub(super) law: Law,
+}
+
+/// Which motion it is, in the frame after the joint's motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Direction {
+    /// About the joint's axis (along it where the joint slides).
+    Joint,
+    /// About the x axis of the link, across the joint's.
+    AcrossX,
+    /// About y.
+    AcrossY,
+}
+
+/// What holds it. Units per rad, or per m where the joint slides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Law {
+    /// A linear spring, N·m/rad.
+    Spring { stiffness: f64 },
+    /// Load = stiffness · θ + cubic · θ³.
+    Hardening { stiffness: f64, cubic: f64 },
+    /// A spring of this compliance (rad/(N·m)) with a damper beside it, which yields with this time constant (s).
+    Creep { compliance: f64, time_constant: f64 },
+    /// Free between ± half a width: gravity decides.
+    LostMotion { half_width: f64 },
+    /// Between two stops of the motor's, with friction against the inboard part.
+    Backlash { half_width: f64 },
+}
+
+impl Law {
+    /// Name in results: that of the effect.
+    pub(super) fn name(self, direction: Direction) -> &'static str {
+        match (self, direction) {
+            (Law::Spring { .. }, Direction::Joint) => "joint_compliance",
+            (Law::Spring { .. }, _) => "link_bending",
+            (Law::Hardening { .. }, _) => "hardening_stiffness",
+            (Law::Creep { .. }, _) => "creep_after_motion",
+            (Law::LostMotion { .. }, _) => "gravity_lost_motion",
+            (Law::Backlash { .. }, _) => "backlash",
+        }
+    }
+}
+
+/// What acts on a coordinate during a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Hold {
+    /// Stiffness and the coordinate at which it is relaxed.
+    Spring { stiffness: f64, rest: f64 },
+    /// Between two limits.
+    Between { lower: f64, upper: f64 },
+}
+
+/// The spring that hardens, as its tangent at `at`: steps then converge as Newton's do.
+pub(super) fn tangent(stiffness: f64, cubic: f64, at: f64) -> Hold {
+    let slope = stiffness + 3.0 * cubic * at * at;
+    Hold::Spring { stiffness: slope, rest: at - at * (stiffness + cubic * at * at) / slope }
+}
+
+/// Spring and damper after `dwell_s` at constant load, from `start`: the exact solution `rest + (start − rest) e^(−t/T)`, in which
+/// `rest` is compliance times load, is that of a stiffer spring with another resting place.
+pub(super) fn crept(compliance: f64, time_constant: f64, start: f64, dwell_s: f64) -> Hold {
+    let kept = libm::exp(-dwell_s / time_constant);
+    // Before anything has crept the coordinate is as good as locked.
+    let yielded = (1.0 - kept).max(1e-9);
+    Hold::Spring { stiffness: 1.0 / (yielded * compliance), rest: kept * start }
+}

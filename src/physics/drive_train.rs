@@ -1,0 +1,165 @@
+//! From the commanded coordinate to the shaft of a joint: encoder, gear, and their errors. Rigid; what yields is in the multibody.
+//!
+//! The servo turns the shaft until the encoder's reading is the commanded coordinate; the gear then puts its own error on the
+//! output. Where several act on one joint, each takes the commanded coordinate: what they would do to each other is of second
+//! order in their amplitudes.
+
+use super::conditions::Conditions;
+
+/// The drive train of one joint.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Drive {
+    pub(super) encoders: Vec<Encoder>,
+    pub(super) wave_generators: Vec<WaveGenerator>,
+    /// Of the joint's own angle, rad/rad.
+    pub(super) ratio_error: f64,
+    /// Joints whose motion leaks, and how much of it.
+    pub(super) leaks: Vec<(usize, f64)>,
+    pub(super) worn: Vec<WornSector>,
+    pub(super) memories: Vec<Memory>,
+    /// Drift of the zero with the temperature of the link that the joint moves, rad/K.
+    pub(super) zero_drift: f64,
+    /// rad/(N·m).
+    pub(super) crosstalk: f64,
+}
+
+/// An encoder whose disc is badly fitted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Encoder {
+    /// The disc's centre is off the axis.
+    OffAxis {
+        /// Distance over the radius of the graduation.
+        eccentricity: f64,
+        /// Direction of the disc's centre seen from the axis at shaft angle zero, with the reading head at angle zero, rad.
+        direction: f64,
+    },
+    /// The encoder's shaft meets the joint's at an angle, coupled by a Hooke joint: `tan reading = cos(bend) tan shaft`, angles
+    /// counted from where the fork lies.
+    Bent {
+        /// `cos(bend)`.
+        cosine: f64,
+        /// Shaft angle at which the fork lies in the plane of both axes, rad.
+        fork: f64,
+    },
+}
+
+impl Encoder {
+    /// The encoder that reads wrongly by `amplitude · cos(order · q + phase)`, to first order in the amplitude.
+    pub(super) fn new(amplitude: f64, order: u8, phase: f64) -> Self {
+        use std::f64::consts::{FRAC_PI_2, PI};
+        let phase = if amplitude < 0.0 { phase + PI } else { phase };
+        let amplitude = amplitude.abs();
+        match order {
+            1 => Encoder::OffAxis { eccentricity: amplitude, direction: phase - FRAC_PI_2 },
+            // The first harmonic of a Hooke joint has the amplitude tan²(bend / 2).
+            _ => Encoder::Bent { cosine: (1.0 - amplitude) / (1.0 + amplitude), fork: -(phase + FRAC_PI_2) / 2.0 },
+        }
+    }
+
+    /// What the shaft has turned beyond the reading when the encoder reads `reading`, rad.
+    pub(super) fn beyond(&self, reading: f64) -> f64 {
+        match *self {
+            Encoder::OffAxis { eccentricity, direction } => {
+                // Seen from the disc's centre, the head has moved on by this, and so has the graduation under it.
+                let head = |shaft: f64| {
+                    let (sine, cosine) = libm::sincos(shaft + direction);
+                    libm::atan2(-eccentricity * sine, 1.0 - eccentricity * cosine)
+                };
+                // reading = shaft − head(shaft); a contraction by the eccentricity, which is small.
+                let mut beyond = 0.0;
+                for _ in 0..20 {
+                    let next = head(reading + beyond);
+                    let done = (next - beyond).abs() < 1e-17;
+                    beyond = next;
+                    if done {
+                        break;
+                    }
+                }
+                beyond
+            }
+            Encoder::Bent { cosine, fork } => {
+                let (s, c) = libm::sincos(reading - fork);
+                libm::atan2(s * c * (1.0 - cosine), cosine * c * c + s * s)
+            }
+        }
+    }
+}
+
+/// The wave generator of a strain-wave gear, whose two lobes push the teeth a little too far or too little.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct WaveGenerator {
+    /// Of the output, rad.
+    pub(super) amplitude: f64,
+    /// Turns of the wave generator per turn of the output.
+    pub(super) ratio: f64,
+    /// rad.
+    pub(super) phase: f64,
+}
+
+/// A sector of worn teeth: the output stands behind where it should, most in the middle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct WornSector {
+    /// In the middle, rad.
+    pub(super) depth: f64,
+    /// rad.
+    pub(super) centre: f64,
+    /// rad.
+    pub(super) half_width: f64,
+}
+
+impl WornSector {
+    /// How far the output stands behind at `angle`, rad.
+    fn behind(&self, angle: f64) -> f64 {
+        use std::f64::consts::{PI, TAU};
+        let turns = libm::round((angle - self.centre) / TAU);
+        let off = (angle - self.centre - TAU * turns).abs();
+        if off >= self.half_width { 0.0 } else { 0.5 * self.depth * (1.0 + libm::cos(PI * off / self.half_width)) }
+    }
+}
+
+/// Friction of a pre-loaded fit after Dahl: the output stays behind by an angle that grows to `amplitude` over `travel` and turns
+/// round with the motion. Dahl's equation `dδ/dq = −(amplitude · sgn dq + δ) / travel · sgn dq` is linear as long as the direction
+/// lasts, so that every move is integrated exactly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Memory {
+    /// rad.
+    pub(super) amplitude: f64,
+    /// rad.
+    pub(super) travel: f64,
+}
+
+/// What is left of a move so many times `travel` ago is below the last bit.
+const FORGOTTEN: f64 = 40.0;
+
+impl Memory {
+    fn state(&self, joint: usize, conditions: &Conditions) -> f64 {
+        // Newest first: each move's saturated value, weighed by what all later moves have left of it.
+        let (mut state, mut faded) = (0.0, 0.0);
+        for (from, to) in conditions.moves_backwards(joint) {
+            let way = (to - from).abs() / self.travel;
+            if way > 0.0 {
+                state -= libm::exp(-faded) * (1.0 - libm::exp(-way)) * self.amplitude.copysign(to - from);
+            }
+            faded += way;
+            if faded > FORGOTTEN {
+                break;
+            }
+        }
+        state
+    }
+}
+
+impl Drive {
+    /// The output's coordinate, without what the loads do to it, rad or m.
+    pub(super) fn output(&self, joint: usize, conditions: &Conditions) -> f64 {
+        let q = conditions.joints[joint];
+        let encoders: f64 = self.encoders.iter().map(|encoder| encoder.beyond(q)).sum();
+        let waves: f64 =
+            self.wave_generators.iter().map(|w| w.amplitude * libm::cos(2.0 * (w.ratio * q) + w.phase)).sum();
+        let leaks: f64 = self.leaks.iter().map(|(source, coupling)| coupling * conditions.joints[*source]).sum();
+        let worn: f64 = self.worn.iter().map(|sector| sector.behind(q)).sum();
+        let memories: f64 = self.memories.iter().map(|memory| memory.state(joint, conditions)).sum();
+        let drift = self.zero_drift * conditions.rise_k[joint + 1];
+        q + (encoders + waves + self.ratio_error * q + leaks - worn + memories + drift)
+    }
+}
