@@ -88,6 +88,23 @@ pub(crate) enum Command {
     #[command(after_help = "Examples:\n  kincal effects                       what there is, where, in which unit and range\n  \
         kincal effects scenes/arm8.toml      each on this arm against statics, 200 random configurations")]
     Effects(EffectsOptions),
+    /// What un-modelled effects do to a calibration: effect × place × magnitude × design × trials
+    #[command(after_help = "Examples:\n  \
+            kincal sweep scenes/arm8.toml --effect radial_clearance --at joint3 --magnitudes 0,10,30,60um\n  \
+            kincal sweep scenes/arm8.toml --effect backlash --at joint2,joint5 --approach up,random --poses 20,40 --trials 200\n  \
+            kincal sweep scenes/arm8.toml --effect joint_compliance --magnitudes 0,50urad/Nm --payloads 0 --payloads 0,5\n  \
+            kincal sweep scenes/arm8.toml                        as the scene injects it\n\n\
+            In parts, anywhere, to the same bytes:\n  \
+            kincal sweep scenes/arm8.toml --effect tilt_clearance --trials 0..500 --out a\n  \
+            kincal sweep scenes/arm8.toml --effect tilt_clearance --trials 500..1000 --out b\n  \
+            kincal sweep --merge a b --out both\n\n\
+            Every combination of the values of all axes is a cell; each trial is a true arm, verification and noise of its own, the same\n\
+            in every cell. Axes that are not given stay as the scene has them. A file for --grid has the same names:\n  \
+            effect = [\"backlash\"]\n  at = [\"joint2\", \"joint5\"]\n  magnitudes = \"0,60arcsec\"\n  poses = [20, 40]\n  \
+            payloads_kg = [[0.0], [0.0, 5.0]]\n  trials = \"200\"\n\n\
+            Results go to OUT/NAME-sweep.jsonl as trials finish; the same command goes on behind them. From them come .mcap, .csv,\n\
+            -combinations.csv, .svg and .png.")]
+    Sweep(SweepOptions),
 }
 
 #[derive(Debug, Args)]
@@ -189,6 +206,54 @@ pub(crate) struct ReproduceOptions {
     /// Trials in place of each experiment's own number
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(crate) trials: Option<u32>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct SweepOptions {
+    /// Scene file (TOML)
+    pub(crate) scene: Option<PathBuf>,
+    /// Override a value of the scene, such as `design.count=20`; may be given again
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+    /// Effects to switch on, one at a time; without it, all that the scene injects
+    #[arg(long, value_name = "KIND", value_delimiter = ',')]
+    pub(crate) effect: Vec<String>,
+    /// Joints or links that have it, by name or number, one at a time; without it, each of the arm
+    #[arg(long, visible_alias = "joints", value_name = "PLACE", value_delimiter = ',')]
+    pub(crate) at: Vec<String>,
+    /// Magnitudes with their unit, such as 0,10,30,60um; without it, none and three from the realistic range
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(crate) magnitudes: Option<String>,
+    /// Numbers of configurations that are fitted
+    #[arg(long, value_name = "M", value_delimiter = ',')]
+    pub(crate) poses: Vec<usize>,
+    /// How they are chosen: random, perturbation, pso, …
+    #[arg(long, value_name = "METHOD", value_delimiter = ',')]
+    pub(crate) method: Vec<String>,
+    /// From which side they are approached: direct, up, down, alternate, random
+    #[arg(long, value_name = "POLICY", value_delimiter = ',')]
+    pub(crate) approach: Vec<String>,
+    /// Courses of the temperature: scene, off, constant, warm-up, heat-and-cool
+    #[arg(long, value_name = "COURSE", value_delimiter = ',')]
+    pub(crate) temperature: Vec<String>,
+    /// Masses in kg that take turns on the tool, such as 0,5; give it again for another set
+    #[arg(long, value_name = "KG,…")]
+    pub(crate) payloads: Vec<String>,
+    /// Readings of each configuration
+    #[arg(long, value_name = "N", value_delimiter = ',')]
+    pub(crate) repeats: Vec<usize>,
+    /// Keep what the scene injects besides the effect
+    #[arg(long)]
+    pub(crate) keep_injected: bool,
+    /// Trials in every cell: how many, or which (from..to, end excluded) [default: 100]
+    #[arg(long, value_name = "N|A..B", allow_hyphen_values = true)]
+    pub(crate) trials: Option<String>,
+    /// The axes from a file (TOML); options stand over it
+    #[arg(long, value_name = "FILE")]
+    pub(crate) grid: Option<PathBuf>,
+    /// Merge files of results (or folders that hold one) into one in OUT
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub(crate) merge: Vec<PathBuf>,
 }
 
 /// Names of the experiments, with what they repeat.

@@ -12,6 +12,7 @@ mod output;
 mod replay;
 mod reproduce;
 mod run;
+mod sweep;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -71,7 +72,7 @@ fn dispatch(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if let (Some(seed), Command::Identify(_) | Command::Replay(_) | Command::Export(_)) = (global.seed, &arguments.command) {
         ensure!(
             false,
-            "--seed {seed}: this command draws nothing; leave it out, or give it to run, design, measure or reproduce"
+            "--seed {seed}: this command draws nothing; leave it out, or give it to run, design, measure, reproduce or sweep"
         );
     }
     output::check_rerun(global)?;
@@ -84,5 +85,6 @@ fn dispatch(arguments: &Arguments) -> anyhow::Result<Outcome> {
         Command::Export(options) => export::command(global, options),
         Command::Effects(options) => effects::command(global, options),
         Command::Reproduce(options) => reproduce::command(global, options),
+        Command::Sweep(options) => sweep::command(global, options),
     }
 }

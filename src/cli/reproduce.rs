@@ -44,7 +44,7 @@ pub(crate) fn command(global: &Global, options: &ReproduceOptions) -> anyhow::Re
     for ((file, path), folder) in scenes.iter().zip(&folders) {
         let injected = output::injected(file, path)?;
         output::show(global, &format!("{}: {}\n", file.scene.name, file.scene.arm_note))?;
-        let progress = Progress { global, bar: Mutex::new(None) };
+        let progress = Progress::new(global);
         let bench = Bench::new(&file.scene, injected, &progress);
         for experiment in &experiments {
             let start = Instant::now();
@@ -124,12 +124,17 @@ fn listed(folder: &Path, written: &[PathBuf]) -> String {
 }
 
 /// Progress bars, one after the other.
-struct Progress<'a> {
+pub(super) struct Progress<'a> {
     global: &'a Global,
     bar: Mutex<Option<ProgressBar>>,
 }
 
-impl Progress<'_> {
+impl<'a> Progress<'a> {
+    /// No bar yet.
+    pub(super) fn new(global: &'a Global) -> Self {
+        Progress { global, bar: Mutex::new(None) }
+    }
+
     fn put(&self, bar: Option<ProgressBar>) {
         if let Ok(mut held) = self.bar.lock()
             && let Some(old) = std::mem::replace(&mut *held, bar)
@@ -138,7 +143,8 @@ impl Progress<'_> {
         }
     }
 
-    fn end(&self) {
+    /// Takes the bar away.
+    pub(super) fn end(&self) {
         self.put(None);
     }
 }

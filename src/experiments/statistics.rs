@@ -1,11 +1,11 @@
 //! What many trials say: means with their intervals, ratios, and rank correlations.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use statrs::statistics::Statistics;
 
 /// A mean over trials.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Mean {
     /// Mean.
     pub mean: f64,
@@ -57,6 +57,43 @@ impl Mean {
         let ratio = better.iter().mean() / base;
         let rest: Vec<f64> = better.iter().zip(worse).map(|(better, worse)| (better - ratio * worse) / base).collect();
         Some(Mean { mean: 1.0 - ratio, interval95: around(1.0 - ratio, rest.iter().std_dev(), rest.len()), trials: rest.len() })
+    }
+}
+
+/// Mean and scatter of values that come one after the other and are not kept (Welford 1962).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Running {
+    count: usize,
+    mean: f64,
+    squares: f64,
+}
+
+impl Running {
+    /// Takes the next value.
+    pub fn push(&mut self, value: f64) {
+        self.count += 1;
+        let before = value - self.mean;
+        self.mean += before / self.count as f64;
+        self.squares += before * (value - self.mean);
+    }
+
+    /// Values taken.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Standard deviation; zero of a single value.
+    #[must_use]
+    pub fn deviation(&self) -> f64 {
+        if self.count > 1 { (self.squares / (self.count - 1) as f64).sqrt() } else { 0.0 }
+    }
+
+    /// Their mean with its interval; `None` where there are none.
+    #[must_use]
+    pub fn mean(&self) -> Option<Mean> {
+        let interval95 = around(self.mean, self.deviation(), self.count);
+        (self.count > 0).then_some(Mean { mean: self.mean, interval95, trials: self.count })
     }
 }
 
@@ -114,6 +151,18 @@ mod tests {
             Mean::of(&[1.0, 2.0]).unwrap().times(-1.0).interval95.unwrap()[0],
             -Mean::of(&[1.0, 2.0]).unwrap().interval95.unwrap()[1]
         );
+    }
+
+    #[test]
+    fn a_running_mean_is_the_mean() {
+        let values = [1.0, 2.0, 3.0, 4.0, 1e3];
+        let mut running = Running::default();
+        assert!(running.mean().is_none());
+        values.iter().for_each(|value| running.push(*value));
+        let (found, known) = (running.mean().unwrap(), Mean::of(&values).unwrap());
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-9 * b.abs();
+        assert!(close(found.mean, known.mean) && found.trials == 5);
+        assert!(close(found.interval95.unwrap()[1], known.interval95.unwrap()[1]));
     }
 
     #[test]

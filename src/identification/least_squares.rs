@@ -297,7 +297,7 @@ pub fn identify_on(
 
 /// The nominal values of `arm` with the parameters `free` (columns) fitted to `measurements` and all others held; `None` if that
 /// does not converge. For frames that nobody has measured, such as the measurement frame and the target on the flange.
-pub(super) fn fit_some(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], free: &[usize]) -> Option<Vec<f64>> {
+pub fn fit_some(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], free: &[usize]) -> Option<Vec<f64>> {
     let problem = Problem::new(arm, sensor, Weights::Noise, measurements).ok()?;
     let nominal = arm.chain.nominal();
     let start = problem.linearise(&nominal);

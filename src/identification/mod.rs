@@ -4,4 +4,4 @@ pub mod alignment;
 pub mod least_squares;
 pub mod outcome;
 
-pub use least_squares::{IdentificationError, identify, identify_on};
+pub use least_squares::{IdentificationError, fit_some, identify, identify_on};

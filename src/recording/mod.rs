@@ -7,6 +7,7 @@ pub mod compare;
 pub mod encode;
 pub mod event;
 pub mod read;
+pub mod tables;
 pub mod topic;
 pub mod truth_file;
 pub mod write;

@@ -2,6 +2,7 @@
 
 pub mod effects;
 pub mod findings;
+pub mod sweep;
 
 mod advice;
 pub mod criterion;

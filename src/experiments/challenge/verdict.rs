@@ -1,0 +1,127 @@
+//! A diagnosis as the scorer sees it: what of `kincal diagnose --json` it needs. Any tool that writes this can be scored.
+
+use serde::{Deserialize, Serialize};
+
+use super::case::CaseTruth;
+use super::folder::Case;
+
+/// A diagnosis. Unknown fields are left out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// `no_gap`, `explained`, `ambiguous`, `unknown_remains`, `not_detectable`.
+    pub verdict: String,
+    /// Effects that are named.
+    #[serde(default)]
+    pub effects: Vec<NamedEffect>,
+    /// Hypotheses that cannot be told apart.
+    #[serde(default)]
+    pub confusion_sets: Vec<Vec<Candidate>>,
+    /// Whether something is left that no effect explains.
+    #[serde(default)]
+    pub unknown: Unknown,
+}
+
+/// An effect that is named.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NamedEffect {
+    /// Its kind.
+    pub kind: String,
+    /// Where.
+    pub location: Place,
+    /// That it is there; one where the tool says nothing.
+    #[serde(default = "certain")]
+    pub probability: f64,
+    /// How large it is.
+    #[serde(default)]
+    pub magnitude: Option<Magnitude>,
+}
+
+fn certain() -> f64 {
+    1.0
+}
+
+/// A place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Place {
+    /// `joint`, `link`, `base`, `tool`, `sensor`.
+    pub level: String,
+    /// From 1.
+    #[serde(default)]
+    pub index: Option<usize>,
+}
+
+/// A magnitude with its interval.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Magnitude {
+    /// In `unit`.
+    #[serde(default)]
+    pub value: Option<f64>,
+    /// As in `effects.md`.
+    #[serde(default)]
+    pub unit: Option<String>,
+    /// 95 % interval.
+    #[serde(default)]
+    pub ci95: Option<[f64; 2]>,
+}
+
+/// A hypothesis of a set.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Candidate {
+    /// Its kind; may be `unknown`.
+    pub kind: String,
+    /// Where.
+    #[serde(default)]
+    pub location: Option<Place>,
+    /// That it is this one.
+    #[serde(default)]
+    pub probability: f64,
+}
+
+/// Whether something is left.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Unknown {
+    /// Something is.
+    #[serde(default)]
+    pub present: bool,
+}
+
+/// Diagnoses a case; why it could not, in words, where it could not.
+pub type Diagnose = fn(&Case) -> Result<Verdict, String>;
+
+/// The trivial baseline: nothing is ever wrong.
+///
+/// # Errors
+/// Never.
+pub fn nothing(_: &Case) -> Result<Verdict, String> {
+    Ok(Verdict { verdict: "no_gap".to_owned(), effects: Vec::new(), confusion_sets: Vec::new(), unknown: Unknown::default() })
+}
+
+/// What whoever knows the truth would say: every known effect at its place with its magnitude, and that the others are unknown.
+#[must_use]
+pub fn oracle(truth: &CaseTruth, withheld: &[String]) -> Verdict {
+    let named = truth.effects.iter().filter(|effect| effect.known && !withheld.contains(&effect.kind));
+    let effects: Vec<NamedEffect> = named
+        .map(|effect| NamedEffect {
+            kind: effect.kind.clone(),
+            location: Place { level: level(effect.location.level), index: effect.location.index },
+            probability: 1.0,
+            magnitude: Some(Magnitude {
+                value: Some(effect.magnitude),
+                unit: Some(effect.unit.clone()),
+                ci95: Some([0.99 * effect.magnitude, 1.01 * effect.magnitude]),
+            }),
+        })
+        .collect();
+    let present = effects.len() < truth.effects.len();
+    let verdict = match (present, effects.is_empty()) {
+        (true, _) => "unknown_remains",
+        (false, true) => "no_gap",
+        (false, false) => "explained",
+    };
+    Verdict { verdict: verdict.to_owned(), effects, confusion_sets: Vec::new(), unknown: Unknown { present } }
+}
+
+/// The name of a level.
+pub(super) fn level(level: crate::effects::Level) -> String {
+    serde_json::to_value(level).ok().and_then(|level| level.as_str().map(str::to_owned)).unwrap_or_default()
+}
