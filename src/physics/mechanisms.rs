@@ -246,7 +246,7 @@ impl Mechanisms {
                 self.drives[joint].memories.push(Memory { amplitude, travel });
             }
             Effect::WrongPayload { excess, stiffness } => {
-                if !(excess.abs() <= 1000.0) {
+                if !(-1000.0..=1000.0).contains(&excess) {
                     return bad("excess", excess, "between -1000 and 1000 (kg)");
                 }
                 stiff("stiffness", stiffness)?;
