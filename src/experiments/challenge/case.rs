@@ -232,8 +232,6 @@ pub fn hidden(public: &Public, options: &Options, key: &[u8; 32], index: usize) 
         length_error_m: PARAMETER_ERRORS[0],
         angle_error_rad: PARAMETER_ERRORS[1],
         parameter_errors: Vec::new(),
-        clearances: Vec::new(),
-        thermal: None,
         effects,
         noise: Noise::Declared { factor },
     };

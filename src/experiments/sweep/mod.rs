@@ -105,7 +105,7 @@ impl Sweep {
         let structure = Subspace::of_structure(arm, file.scene.sensor.attitude_sigma_rad.is_some());
         let injected = match grid.background {
             Background::Scene => injected.clone(),
-            Background::Nothing => Injected { clearances: Vec::new(), thermal: None, effects: Vec::new(), ..injected.clone() },
+            Background::Nothing => Injected { effects: Vec::new(), ..injected.clone() },
         };
         Ok(Sweep { cells: ready, injected, structure, seed: file.scene.seed, header })
     }
@@ -221,7 +221,7 @@ impl Sweep {
 
     /// What is injected without and with the cell's effect; without is absent where the cell has none of its own that could be seen.
     fn injected_of(&self, cell: &Cell, scene: &Scene) -> (Option<Injected>, Injected) {
-        let nothing = || Injected { clearances: Vec::new(), thermal: None, effects: Vec::new(), ..self.injected.clone() };
+        let nothing = || Injected { effects: Vec::new(), ..self.injected.clone() };
         match Sort::from_name(&cell.effect) {
             Some(sort) => {
                 let mut stream = truth::stream(&self.injected, scene.seed, "sweep/effect");
@@ -248,7 +248,7 @@ impl Sweep {
     ) -> Result<Vec<[f64; 6]>, SweepError> {
         let with = noiseless(scene, injected, planned).map_err(SessionError::from)?;
         // An arm without effects is its kinematics.
-        let plain = background.effects.is_empty() && background.clearances.is_empty() && background.thermal.is_none();
+        let plain = background.effects.is_empty();
         let without: Vec<Pose> = if plain {
             planned.iter().map(|planned| truly.forward(&planned.joints)).collect()
         } else {
