@@ -35,14 +35,7 @@ impl<'a> SimulatedSensor<'a> {
 
     /// The pose and the temperatures (°C, of the moving links) that it reads when `share` of the session has passed. An `exact`
     /// reading is another instrument's, without any fault.
-    pub(super) fn read(
-        &mut self,
-        truth: &Pose,
-        exact: bool,
-        share: f64,
-        rise_k: &[f64],
-        reference_c: f64,
-    ) -> (Pose, Vec<f64>) {
+    pub(super) fn read(&mut self, truth: &Pose, exact: bool, share: f64, rise_k: &[f64], reference_c: f64) -> (Pose, Vec<f64>) {
         let seen = self.seen(truth, share);
         // Drawn for every reading, so that one more outlier does not shift the noise of the others.
         let widened = self.widened();
@@ -100,8 +93,7 @@ impl<'a> SimulatedSensor<'a> {
             };
             // The sensor turns where it stands and is carried along; its frame goes with it.
             let turn = rotation_from_vector(&rotation);
-            let believed_from_true =
-                Pose::from_parts(Translation3::from(stand + translation - turn * stand), turn).inverse();
+            let believed_from_true = Pose::from_parts(Translation3::from(stand + translation - turn * stand), turn).inverse();
             seen = believed_from_true * seen;
         }
         for effect in self.effects {

@@ -73,9 +73,7 @@ impl TrueEffect {
                 let more = vec![("radial_m", *radial), ("axial_m", *axial), ("tilt_rad", *tilt)];
                 if *radial == 0.0 && *tilt > 0.0 { (*tilt, "rad", more) } else { (*radial, "m", more) }
             }
-            Effect::BaseDrift { translation, rotation, .. } => {
-                (translation.norm(), "m", vec![("rotation_rad", rotation.norm())])
-            }
+            Effect::BaseDrift { translation, rotation, .. } => (translation.norm(), "m", vec![("rotation_rad", rotation.norm())]),
             Effect::BaseStep { translation, rotation, after, .. } | Effect::ToolStep { translation, rotation, after } => {
                 (translation.norm(), "m", vec![("rotation_rad", rotation.norm()), ("after", *after)])
             }

@@ -40,16 +40,7 @@ impl<'a> Conditions<'a> {
     /// The first reading of a session, at `joints`, without a move, payload or warmth.
     #[must_use]
     pub fn still(joints: &'a [f64], rise_k: &'a [f64]) -> Self {
-        Conditions {
-            joints,
-            from: joints,
-            rise_k,
-            payload_kg: 0.0,
-            time_s: 0.0,
-            session_s: 0.0,
-            dwell_s: 0.0,
-            history: &[],
-        }
+        Conditions { joints, from: joints, rise_k, payload_kg: 0.0, time_s: 0.0, session_s: 0.0, dwell_s: 0.0, history: &[] }
     }
 
     /// Share of the session that has passed, 0 to 1.

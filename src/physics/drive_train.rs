@@ -154,8 +154,7 @@ impl Drive {
     pub(super) fn output(&self, joint: usize, conditions: &Conditions) -> f64 {
         let q = conditions.joints[joint];
         let encoders: f64 = self.encoders.iter().map(|encoder| encoder.beyond(q)).sum();
-        let waves: f64 =
-            self.wave_generators.iter().map(|w| w.amplitude * libm::cos(2.0 * (w.ratio * q) + w.phase)).sum();
+        let waves: f64 = self.wave_generators.iter().map(|w| w.amplitude * libm::cos(2.0 * (w.ratio * q) + w.phase)).sum();
         let leaks: f64 = self.leaks.iter().map(|(source, coupling)| coupling * conditions.joints[*source]).sum();
         let worn: f64 = self.worn.iter().map(|sector| sector.behind(q)).sum();
         let memories: f64 = self.memories.iter().map(|memory| memory.state(joint, conditions)).sum();

@@ -133,10 +133,10 @@ impl PhysicalArm {
             let reached = self.world.base_from_tool();
             (moved_m, moved_rad) = distance(&reached, &base_from_tool);
             base_from_tool = reached;
-            converged =
-                steps >= least && moved_m < self.settling.tolerance_m && moved_rad < self.settling.tolerance_rad;
+            converged = steps >= least && moved_m < self.settling.tolerance_m && moved_rad < self.settling.tolerance_rad;
         }
-        let standing = task.placement.base_shift.map_or(self.arm.base_from_base_link, |shift| shift * self.arm.base_from_base_link);
+        let standing =
+            task.placement.base_shift.map_or(self.arm.base_from_base_link, |shift| shift * self.arm.base_from_base_link);
         let base_from_link = std::iter::once(standing)
             .chain((0..count).map(|joint| self.world.base_from_link(joint) * self.arm.joint_from_link[joint]))
             .collect();
@@ -429,7 +429,8 @@ mod tests {
                 let joints = test_arms::configuration(&arm, &mut stream);
                 let growth = test_arms::growth(&arm, &mut stream);
                 let settling = Settling { start: Start::Centre, ..Settling::default() };
-                let settled = settle(&mut PhysicalArm::new(&arm, &parameters, &effects(&clearances), settling).unwrap(), &joints, &growth);
+                let settled =
+                    settle(&mut PhysicalArm::new(&arm, &parameters, &effects(&clearances), settling).unwrap(), &joints, &growth);
                 assert!(settled.converged);
                 steps = steps.max(settled.steps);
                 steps_all += settled.steps;
@@ -483,7 +484,8 @@ mod tests {
             let clearances = fractions(KINDS[3].1, &mut stream);
             let joints = test_arms::configuration(&arm, &mut stream);
             let settling = Settling { start: Start::Centre, ..Settling::default() };
-            let settled = settle(&mut PhysicalArm::new(&arm, &parameters, &effects(&clearances), settling).unwrap(), &joints, &[1.0; 9]);
+            let settled =
+                settle(&mut PhysicalArm::new(&arm, &parameters, &effects(&clearances), settling).unwrap(), &joints, &[1.0; 9]);
             let segments = arm.chain.at(&parameters).segments();
             let energy = |plays: &[Play]| {
                 let mut base_from_link = Pose::identity();
@@ -545,7 +547,8 @@ mod tests {
         let clearances = fractions(KINDS[3].1, &mut stream);
         let configurations: Vec<Vec<f64>> = (0..20).map(|_| test_arms::configuration(&arm, &mut stream)).collect();
         for start in [Start::Centre, Start::Predicted] {
-            let fresh = || PhysicalArm::new(&arm, &parameters, &effects(&clearances), Settling { start, ..Settling::default() }).unwrap();
+            let fresh =
+                || PhysicalArm::new(&arm, &parameters, &effects(&clearances), Settling { start, ..Settling::default() }).unwrap();
             let settle = |physical: &mut PhysicalArm, joints: &Vec<f64>| bits(&settle(physical, joints, &[1.0; 9]));
             let alone: Vec<_> = configurations.iter().map(|joints| settle(&mut fresh(), joints)).collect();
             let mut used = fresh();
@@ -574,8 +577,9 @@ mod tests {
             let parameters = test_arms::parameters_true(&arm, &mut stream);
             let clearances = fractions(KINDS[3].1, &mut stream);
             let joints = test_arms::configuration(&arm, &mut stream);
-            let settle =
-                |settling| settle(&mut PhysicalArm::new(&arm, &parameters, &effects(&clearances), settling).unwrap(), &joints, &[1.0; 9]);
+            let settle = |settling| {
+                settle(&mut PhysicalArm::new(&arm, &parameters, &effects(&clearances), settling).unwrap(), &joints, &[1.0; 9])
+            };
             let rest = settle(Settling { tolerance_m: 1e-13, tolerance_rad: 1e-13, ..Settling::default() });
             assert!(rest.converged);
             for (start, steps_max) in [(Start::Centre, 2), (Start::Centre, 3), (Start::Predicted, 1), (Start::Predicted, 50)] {
@@ -602,7 +606,11 @@ mod tests {
             let joints = test_arms::configuration(&arm, &mut stream);
             let settled = |start| {
                 let settling = Settling { start, ..Settling::default() };
-                let settled = settle(&mut PhysicalArm::new(&arm, &parameters, &effects(&[largest; 8]), settling).unwrap(), &joints, &[1.0; 9]);
+                let settled = settle(
+                    &mut PhysicalArm::new(&arm, &parameters, &effects(&[largest; 8]), settling).unwrap(),
+                    &joints,
+                    &[1.0; 9],
+                );
                 assert!(settled.converged && settled.steps < 20, "{} steps", settled.steps);
                 for seat in settled.seats.iter().filter(|seat| seat.radial_by == SeatedBy::Load) {
                     let reached = Vector2::from(seat.radial_in_joint).norm() / largest.radial_m;
@@ -620,8 +628,11 @@ mod tests {
         arm.gravity_in_base.fill(0.0);
         let clearance = Clearance { radial_m: 30e-6, axial_m: 20e-6, tilt_rad: 100e-6 };
         let nominal = arm.chain.nominal();
-        let settled =
-            settle(&mut PhysicalArm::new(&arm, &nominal, &effects(&[clearance; 8]), Settling::default()).unwrap(), &[0.5; 8], &[1.0; 9]);
+        let settled = settle(
+            &mut PhysicalArm::new(&arm, &nominal, &effects(&[clearance; 8]), Settling::default()).unwrap(),
+            &[0.5; 8],
+            &[1.0; 9],
+        );
         assert!(settled.converged);
         assert!(pose_error(&settled.base_from_tool, &arm.chain.at_nominal().forward(&[0.5; 8])).amax() < 1e-14);
         assert!(settled.seats.iter().all(|seat| seat.radial_by == SeatedBy::Friction && seat.tilt_by == SeatedBy::Friction));
@@ -662,7 +673,11 @@ mod tests {
         let clearance = Clearance { radial_m: c, axial_m: 25e-6, tilt_rad: gamma };
         for q in [0.0, 1.0, -2.0] {
             let settling = Settling { start: Start::Centre, ..Settling::default() };
-            let settled = settle(&mut PhysicalArm::new(&arm, &arm.chain.nominal(), &effects(&[clearance]), settling).unwrap(), &[q], &[1.0; 2]);
+            let settled = settle(
+                &mut PhysicalArm::new(&arm, &arm.chain.nominal(), &effects(&[clearance]), settling).unwrap(),
+                &[q],
+                &[1.0; 2],
+            );
             let seat = settled.seats[0];
             assert_eq!((seat.radial_by, seat.axial_by, seat.tilt_by), (SeatedBy::Load, SeatedBy::Friction, SeatedBy::Load));
             let tool = settled.base_from_tool.translation.vector;
@@ -692,7 +707,8 @@ mod tests {
         let clearance = Clearance { radial_m: c, axial_m: 25e-6, tilt_rad: gamma };
         for q in [0.0, 1.0, -2.0] {
             let settling = Settling { start: Start::Centre, ..Settling::default() };
-            let settled = settle(&mut PhysicalArm::new(&arm, &parameters, &effects(&[clearance]), settling).unwrap(), &[q], &[1.0; 2]);
+            let settled =
+                settle(&mut PhysicalArm::new(&arm, &parameters, &effects(&[clearance]), settling).unwrap(), &[q], &[1.0; 2]);
             let seat = settled.seats[0];
             // The joint's frame has x along base x, y down, z along base y; nothing pushes along the axis.
             assert_eq!((seat.radial_by, seat.axial_by, seat.tilt_by), (SeatedBy::Load, SeatedBy::Friction, SeatedBy::Load));
@@ -708,8 +724,9 @@ mod tests {
     fn what_cannot_be_simulated_is_refused() {
         let arm = test_arms::eight();
         let nominal = arm.chain.nominal();
-        let new =
-            |arm: &Arm, clearances: &[Clearance], settling| PhysicalArm::new(arm, &nominal, &effects(clearances), settling).err().unwrap();
+        let new = |arm: &Arm, clearances: &[Clearance], settling| {
+            PhysicalArm::new(arm, &nominal, &effects(clearances), settling).err().unwrap()
+        };
         let mut bare = arm.clone();
         bare.links[3].inertial = None;
         let error = new(&bare, &[Clearance::NONE; 8], Settling::default());

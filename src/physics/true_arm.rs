@@ -76,12 +76,7 @@ const SMALLEST_HOLDING: f64 = 1e-9;
 const LOST_MOTION_SHARE: f64 = 2e-3;
 
 impl TrueArm {
-    pub(super) fn new(
-        arm: &Arm,
-        parameters_true: &[f64],
-        effects: &[Effect],
-        holding_ratio: f64,
-    ) -> Result<Self, PhysicsError> {
+    pub(super) fn new(arm: &Arm, parameters_true: &[f64], effects: &[Effect], holding_ratio: f64) -> Result<Self, PhysicsError> {
         let count = arm.joint_count();
         check_count("true parameters", parameters_true.len(), arm.chain.parameters.len())?;
         check_count("links (one per joint, and the base)", arm.links.len(), count + 1)?;

@@ -19,8 +19,8 @@ use rapier3d::dynamics::{
 use rapier3d::pipeline::PhysicsWorld;
 
 use super::clearance::SeatedBy;
-use super::coordinate::{Coordinate, Direction, Hold, Law};
 use super::convert::{matrix_to_rapier, pose_from_rapier, pose_to_rapier, vector_to_rapier};
+use super::coordinate::{Coordinate, Direction, Hold, Law};
 use super::play::{Decision, Load, Play};
 use super::true_arm::{Placement, TrueArm, turn_about_z};
 use crate::frames::Pose;

@@ -93,7 +93,13 @@ pub type Diagnose = fn(&Case) -> Result<Verdict, String>;
 /// # Errors
 /// Never.
 pub fn nothing(_: &Case) -> Result<Verdict, String> {
-    Ok(Verdict { verdict: "no_gap".to_owned(), effects: Vec::new(), confusion_sets: Vec::new(), unknown: Unknown::default() })
+    Ok(nothing_at_all())
+}
+
+/// The verdict that nothing is wrong.
+#[must_use]
+pub fn nothing_at_all() -> Verdict {
+    Verdict { verdict: "no_gap".to_owned(), effects: Vec::new(), confusion_sets: Vec::new(), unknown: Unknown::default() }
 }
 
 /// What whoever knows the truth would say: every known effect at its place with its magnitude, and that the others are unknown.
