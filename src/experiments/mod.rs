@@ -11,6 +11,7 @@ pub mod conditions;
 pub mod count_error;
 pub mod count_index;
 pub mod detectability;
+pub mod effect_validation;
 pub mod findings;
 pub mod globality;
 pub mod headline;

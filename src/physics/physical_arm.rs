@@ -732,7 +732,7 @@ mod tests {
         let error = new(&bare, &[Clearance::NONE; 8], Settling::default());
         assert_eq!(error, PhysicsError::MissingInertial { link: "link3".to_owned() });
         let error = new(&arm, &[Clearance { radial_m: 1e-6, ..Clearance::NONE }; 9], Settling::default());
-        assert_eq!(error.to_string(), "clearance is at joint number 9, but the arm has 8 joints");
+        assert_eq!(error.to_string(), "radial_clearance is at joint number 9, but the arm has 8 joints");
         let error = new(&arm, &[Clearance { radial_m: -1e-6, ..Clearance::NONE }; 8], Settling::default());
         assert_eq!(error.to_string(), "radial clearance of joint number 1 is -0.000001, allowed is 0 to 0.001 (m)");
         let error = new(&arm, &[Clearance::NONE; 8], Settling { tolerance_m: f64::NAN, ..Settling::default() });
