@@ -178,8 +178,8 @@ pub(crate) struct ScoreOptions {
     #[arg(long, value_name = "DIR")]
     pub(crate) verdicts: Option<PathBuf>,
     /// Diagnosis that needs no thought, to be scored in place of kincal's
-    #[arg(long, value_enum, default_value_t = Baseline::None)]
-    pub(crate) baseline: Baseline,
+    #[arg(long, value_enum, conflicts_with = "verdicts")]
+    pub(crate) baseline: Option<Baseline>,
 }
 
 /// Trivial diagnoses.

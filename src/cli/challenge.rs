@@ -27,6 +27,14 @@ const USUAL_OUT: &str = "recordings";
 /// A seed below this can be found by trying.
 const GUESSABLE: u64 = 1 << 40;
 
+/// The diagnosis that finds nothing.
+const BASELINE: (&str, Diagnose) = ("the baseline that never finds anything", nothing);
+
+/// Kincal's own diagnosis with its name, once there is one.
+fn diagnosis() -> Option<(&'static str, Diagnose)> {
+    None
+}
+
 pub(crate) fn command(global: &Global, command: &ChallengeCommand) -> anyhow::Result<Outcome> {
     match command {
         ChallengeCommand::New(options) => new(global, options),
@@ -195,12 +203,17 @@ fn scored(global: &Global, options: &ScoreOptions) -> anyhow::Result<Outcome> {
             (verdicts.display().to_string(), all)
         }
         None => {
-            let (who, diagnose): (&str, Diagnose) = match options.baseline {
-                Baseline::None => ("the baseline that never finds anything", nothing),
+            let (who, diagnose) = match (options.baseline, diagnosis()) {
+                (Some(Baseline::None), _) => BASELINE,
+                (None, Some(diagnosis)) => diagnosis,
+                (None, None) => {
+                    output::note(global, "note: kincal has no diagnosis yet: a trivial baseline is scored");
+                    BASELINE
+                }
             };
             let progress = Progress::new(global);
             progress.begin("diagnosing", count);
-            let diagnosed: Vec<(Verdict, f64)> = (0..count)
+            let diagnosed: Vec<(serde_json::Value, f64)> = (0..count)
                 .into_par_iter()
                 .map(|index| {
                     let case = folder.case(index)?;
@@ -217,7 +230,8 @@ fn scored(global: &Global, options: &ScoreOptions) -> anyhow::Result<Outcome> {
                 output::write(&path, &format!("{}\n", serde_json::to_string_pretty(verdict)?))?;
             }
             seconds = diagnosed.iter().map(|(_, seconds)| *seconds).collect();
-            (who.to_owned(), diagnosed.into_iter().map(|(verdict, _)| verdict).collect())
+            let read = |(verdict, _)| serde_json::from_value(verdict).context("the diagnosis is no verdict");
+            (who.to_owned(), diagnosed.into_iter().map(read).collect::<anyhow::Result<_>>()?)
         }
     };
     let sealed = folder.unseal()?;

@@ -28,22 +28,41 @@ fn single(name: String, row: &Single) -> Vec<String> {
 }
 
 const SINGLE: [&str; 9] =
-    ["one effect", "cases", "right kind", "right place", "abstained", "in a set", "wrong kind", "confidently", "unknown"];
+    ["one effect, by λ", "cases", "right kind", "right place", "abstained", "in a set", "wrong kind", "confidently", "unknown"];
 
 /// All tables. `seconds` are the times of the diagnosis, case by case; empty where it was made elsewhere.
 #[must_use]
 pub fn score(score: &Score, who: &str, seconds: &[f64]) -> String {
     let mut text = format!("{} cases, diagnosed by {who}\n", score.cases);
-    let mut header = SINGLE;
-    header[0] = "one effect, by λ";
-    text.push_str(&table(&header, score.single.iter().map(|row| single(row.lambda.clone(), row)).collect()));
+    text.push_str(&table(&SINGLE, score.single.iter().map(|row| single(row.lambda.clone(), row)).collect()));
     text.push('\n');
-    header[0] = "one effect, by kind: all, λ ≥ 40";
-    let kinds = score
-        .by_kind
-        .iter()
-        .flat_map(|kind| [single(kind.kind.clone(), &kind.all), single(format!("  {}, λ ≥ 40", kind.kind), &kind.visible)]);
+    let kinds = score.by_kind.iter().map(|kind| {
+        let (all, visible) = (&kind.all, &kind.visible);
+        let named = |row: &&Confusion| row.truth == kind.kind && row.lambda == visible.lambda && row.named != kind.kind;
+        let instead: Vec<String> =
+            score.confusion.iter().filter(named).map(|row| format!("{} {}", row.cases, row.named)).collect();
+        vec![
+            kind.kind.clone(),
+            all.cases.to_string(),
+            share(all.right, all.cases),
+            share(all.wrong, all.cases),
+            visible.cases.to_string(),
+            share(visible.right, visible.cases),
+            share(visible.right_place, visible.right),
+            if instead.is_empty() { "–".to_owned() } else { instead.join(", ") },
+        ]
+    });
     if !score.by_kind.is_empty() {
+        let header = [
+            "one effect, by kind",
+            "cases",
+            "right kind",
+            "wrong kind",
+            "λ ≥ 40",
+            "right kind",
+            "right place",
+            "there named instead",
+        ];
         text.push_str(&table(&header, kinds.collect()));
         text.push('\n');
     }

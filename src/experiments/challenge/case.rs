@@ -298,7 +298,7 @@ pub fn measured(public: &Public, hidden: &Hidden, index: usize) -> Result<(Vec<M
 /// # Errors
 /// If it cannot be written.
 pub fn write(folder: &Path, index: usize, public: &Public, measurements: &[Measurement]) -> Result<PathBuf, ChallengeError> {
-    let mut recorder = Recorder::create(folder, &name(index), &public.file.scene.arm)?;
+    let mut recorder = Recorder::create(folder, &name(index), &public.file.scene.arm)?.sources_only();
     let poses = Some(measurements.len());
     recorder
         .take(&Event::Start(Start { poses, ..start_event("measure", &public.file.public_toml()?) }))
