@@ -310,7 +310,7 @@ pub(crate) struct SweepOptions {
     #[arg(long, value_name = "COURSE", value_delimiter = ',')]
     pub(crate) temperature: Vec<String>,
     /// Masses in kg that take turns on the tool, such as 0,5; give it again for another set
-    #[arg(long, value_name = "KG,…")]
+    #[arg(long, value_name = "KG,…", allow_hyphen_values = true)]
     pub(crate) payloads: Vec<String>,
     /// Readings of each configuration
     #[arg(long, value_name = "N", value_delimiter = ',')]

@@ -94,7 +94,6 @@ fn the_same_poses_from_two_truths_are_the_same_file() {
         // Another truth in words, the same in deed: an effect more, of no size.
         let mut other = case::hidden(&public, &options, &key, index);
         other.injected.effects.push(Effect::MeasurementScale { scale: 0.0 });
-        other.injected.effects.push(Effect::GearCoupling { joint: 2, ratio_error: 0.0, coupling: 0.0, source: 1 });
         other.noise.factor = 7.0;
         let [a, b] = [&one, &other].map(|hidden| case::measured(&public, hidden, index).unwrap());
         assert_ne!(a.1, b.1);
