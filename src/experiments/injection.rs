@@ -317,10 +317,16 @@ pub fn magnitudes(text: &str, sort: Sort) -> Result<Vec<f64>, String> {
             None if number == 0.0 => 1.0,
             None => return Err(format!("the unit of `{part}` is missing; units of {}: {}", sort.name(), names())),
         };
-        values.push(number * factor);
+        values.push(in_si(number, factor));
     }
     values.reverse();
     Ok(values)
+}
+
+/// `number` times `factor`, rounded once where the factor is one over a whole number: 10 µm are 1e-5 m to the last bit.
+fn in_si(number: f64, factor: f64) -> f64 {
+    let inverse = (1.0 / factor).round();
+    if (inverse * factor - 1.0).abs() < 1e-12 { number / inverse } else { number * factor }
 }
 
 /// A magnitude in the unit in which results are printed.

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::folder::ChallengeError;
-use crate::cell::plan::{Planned, plan};
 use crate::cell::measure;
+use crate::cell::plan::{Planned, plan};
 use crate::design::candidates::{Rules, Sampler};
 use crate::design::search::split;
 use crate::effects::Location;
@@ -222,7 +222,8 @@ pub fn hidden(public: &Public, options: &Options, key: &[u8; 32], index: usize) 
             effects.push(effect);
         }
     }
-    let factor = if (options.heavy_tails..options.heavy_tails + options.understated).contains(&which) { UNDERSTATED } else { 1.0 };
+    let factor =
+        if (options.heavy_tails..options.heavy_tails + options.understated).contains(&which) { UNDERSTATED } else { 1.0 };
     let tails = (which < options.heavy_tails).then_some(TAILS);
     if let Some(Tails { share, factor }) = tails {
         effects.push(Effect::MeasurementOutliers { share, factor });
@@ -232,8 +233,6 @@ pub fn hidden(public: &Public, options: &Options, key: &[u8; 32], index: usize) 
         length_error_m: PARAMETER_ERRORS[0],
         angle_error_rad: PARAMETER_ERRORS[1],
         parameter_errors: Vec::new(),
-        clearances: Vec::new(),
-        thermal: None,
         effects,
         noise: Noise::Declared { factor },
     };
@@ -247,8 +246,7 @@ pub fn hidden(public: &Public, options: &Options, key: &[u8; 32], index: usize) 
 /// If the arm cannot be simulated.
 pub fn measured(public: &Public, hidden: &Hidden, index: usize) -> Result<(Vec<Measurement>, CaseTruth), ChallengeError> {
     let (scene, planned, injected) = (&public.file.scene, &public.planned, &hidden.injected);
-    let (measurements, truth) =
-        measure(scene, injected, planned, planned.len(), &mut Nobody).map_err(SessionError::from)?;
+    let (measurements, truth) = measure(scene, injected, planned, planned.len(), &mut Nobody).map_err(SessionError::from)?;
     let values: Vec<f64> = truth.parameters.iter().map(|parameter| parameter.true_value).collect();
     let mut effects: Vec<TrueEffect> = hidden
         .sorts
@@ -298,9 +296,11 @@ pub fn measured(public: &Public, hidden: &Hidden, index: usize) -> Result<(Vec<M
 /// # Errors
 /// If it cannot be written.
 pub fn write(folder: &Path, index: usize, public: &Public, measurements: &[Measurement]) -> Result<PathBuf, ChallengeError> {
-    let mut recorder = Recorder::create(folder, &name(index), &public.file.scene.arm)?;
+    let mut recorder = Recorder::create(folder, &name(index), &public.file.scene.arm)?.sources_only();
     let poses = Some(measurements.len());
-    recorder.take(&Event::Start(Start { poses, ..start_event("measure", &public.file.public_toml()?) })).map_err(SessionError::from)?;
+    recorder
+        .take(&Event::Start(Start { poses, ..start_event("measure", &public.file.public_toml()?) }))
+        .map_err(SessionError::from)?;
     for measurement in measurements {
         recorder.take(&Event::Measured(measurement.clone())).map_err(SessionError::from)?;
     }
