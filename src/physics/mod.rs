@@ -21,16 +21,17 @@
 //! What the sensor does is in `cell::sensor`. Several effects at one joint are in series from the motor outwards: drive train,
 //! clearance, backlash, lost motion, springs, bending. Only this module sees rapier, and only `convert` sees both kinds of vectors.
 //!
-//! [`PhysicalArm::settle`] goes like this. The joints' frames are put where the commanded coordinates want them (the servos are
-//! ideal but for the drive trains), every clearance in its middle. The load on each play is gravity through rapier's Jacobians; where it is below the
+//! [`PhysicalArm::settle`] goes like this. The joints' frames are put where the drive trains have turned them for the commanded
+//! coordinates, every clearance in its middle. The load on each play is gravity through rapier's Jacobians; where it is below the
 //! friction of the fit ([`Settling::holding_ratio`]) the coordinate is undecided and stays in the middle. Then rapier steps,
-//! heavily damped and from rest each time, until the tool no longer moves. `static_seat` solves the same by statics, without
-//! rapier: tests compare a simulation from the middle ([`Start::Centre`]) with it, and one may start there to save steps
-//! ([`Start::Predicted`]).
+//! heavily damped (springs not at all) and from rest each time, until the tool no longer moves. `static_seat` solves clearances by
+//! statics, without rapier: tests compare a simulation from the middle ([`Start::Centre`]) with it, and one may start there to save
+//! steps ([`Start::Predicted`]).
 //!
 //! How exact it is (tests and `tests/benches/physics.rs`; eight joints, clearances to 60 µm and 200 µrad in all of them):
-//! without effects, forward kinematics to 2e-15 m. Every effect against statics: `kincal effects scenes/arm8.toml`. With clearance, the linear programme about the seat to 4e-11 m and
-//! 7e-8 rad (the latter is second order in the tilt), the one about the middle of the clearances to 0.2 µm and 0.4 µrad.
+//! without effects, forward kinematics to 2e-15 m. With clearance, the linear programme about the seat to 4e-11 m and 7e-8 rad (the
+//! latter is second order in the tilt), the one about the middle of the clearances to 0.2 µm and 0.4 µrad. Every effect against an
+//! independent solution: `experiments::effect_validation`, `kincal effects scenes/arm8.toml`.
 
 pub mod clearance;
 pub mod conditions;
