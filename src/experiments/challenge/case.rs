@@ -17,7 +17,7 @@ use crate::measurement::Measurement;
 use crate::recording::event::{Event, Listener, Nobody, Start};
 use crate::recording::write::Recorder;
 use crate::scene::effect::Effect;
-use crate::scene::{ApproachPolicy, Injected, Noise, SceneFile};
+use crate::scene::{Injected, Noise, SceneFile};
 use crate::seed::{Stream, hidden_key, hidden_stream};
 use crate::session::{SessionError, start_event};
 
@@ -175,12 +175,15 @@ pub fn public(base: &SceneFile, options: &Options, key: &[u8; 32], index: usize)
 /// Random approach, heat and cool with a lag for each link, payloads that take turns, two readings of some configurations.
 fn conditions(file: &mut SceneFile, options: &Options) -> Result<(), ChallengeError> {
     let session_s = options.poses as f64 * file.scene.plan.seconds_per_pose;
-    let temperature = course("heat-and-cool", &file.scene.arm, session_s);
-    let plan = &mut file.scene.plan;
-    plan.approach.policy = ApproachPolicy::Random;
-    plan.payloads_kg = PAYLOADS_KG.to_vec();
-    plan.repeats = if options.repeats > 0 { 2 } else { 1 };
-    plan.temperature = temperature;
+    let course = course("heat-and-cool", &file.scene.arm, session_s);
+    file.set("plan.approach", "\"random\"")?;
+    file.set("plan.payloads_kg", &format!("{PAYLOADS_KG:?}"))?;
+    file.set("plan.repeats", if options.repeats > 0 { "2" } else { "1" })?;
+    if let Some(course) = course {
+        let (rise, lag, air) = (course.rise_k, course.lag_s, course.ambient_rise_k);
+        let table = format!("{{ profile = \"heat-and-cool\", rise_k = {rise:?}, lag_s = {lag:?}, ambient_rise_k = {air:?} }}");
+        file.set("plan.temperature", &table)?;
+    }
     Ok(())
 }
 
