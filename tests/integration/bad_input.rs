@@ -277,7 +277,7 @@ fn tables_that_are_wrong() {
     with(value("role", "test"), &["line 3", "`fit` or `held_out`"]);
     with(value("pose_id", "-1"), &["line 3", "a whole number"]);
     with(value("qw", "7"), &["line 3", "quaternion"]);
-    with([&rows[..3], &["1,2,3"], &rows[3..]].concat().join("\n"), &["line 4", "3 values", "26 columns"]);
+    with([&rows[..3], &["1,2,3"], &rows[3..]].concat().join("\n"), &["line 4", "3 values", "37 columns"]);
     let same: Vec<&str> = std::iter::once(rows[0])
         .chain(std::iter::repeat_n(*rows.iter().find(|row| row.contains(",fit,")).unwrap(), 60))
         .collect();
