@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::plan::Planned;
 use super::sensor::SimulatedSensor;
+use super::temperature;
 use super::truth::{self, TruePose, Truth};
 use crate::measurement::{Measurement, Role};
 use crate::physics::{Conditions, PhysicalArm, PhysicsError, Settled, Settling, Stop};
@@ -31,7 +32,7 @@ pub enum MeasureError {
 pub fn check(scene: &Scene, injected: &Injected) -> Result<(), PhysicsError> {
     let parameters = truth::parameters(&scene.arm, injected, scene.seed);
     let values: Vec<f64> = parameters.iter().map(|parameter| parameter.true_value).collect();
-    PhysicalArm::new(&scene.arm, &values, &truth::effects(injected), Settling::default()).map(drop)
+    PhysicalArm::new(&scene.arm, &values, &injected.effects, Settling::default()).map(drop)
 }
 
 /// Measures `planned` on the true arm that `injected` makes of the scene's, telling `listener` every measurement.
@@ -54,22 +55,20 @@ pub fn measure(
     let arm = &scene.arm;
     let parameters = truth::parameters(arm, injected, scene.seed);
     let values: Vec<f64> = parameters.iter().map(|parameter| parameter.true_value).collect();
-    let effects = truth::effects(injected);
-    let new_arm = || PhysicalArm::new(arm, &values, &effects, Settling::default());
+    let new_arm = || PhysicalArm::new(arm, &values, &injected.effects, Settling::default());
     let stops: Vec<Stop> = planned.iter().map(stop).collect();
     let session_s = session_s(scene, planned, session_poses);
     let mut sensor = SimulatedSensor::new(&scene.sensor, injected, scene.seed);
 
     let mut measurements = Vec::with_capacity(planned.len());
     let mut poses = Vec::with_capacity(planned.len());
-    let last = session_poses.saturating_sub(1).max(1) as f64;
     for (batch, chunk) in planned.chunks(BATCH).enumerate() {
         let settled: Vec<(Settled, Vec<f64>)> = chunk
             .par_iter()
             .enumerate()
             .map_init(new_arm, |physical, (offset, planned)| {
                 let index = batch * BATCH + offset;
-                let rise = truth::temperature_rise(arm, injected, index as f64 / last);
+                let rise = temperature::rises(&scene.plan, arm.links.len(), planned.time_s, session_s);
                 let conditions = Conditions {
                     joints: &planned.joints,
                     from: &planned.from,
@@ -103,6 +102,7 @@ pub fn measure(
                 position_m: pose.translation.vector.into(),
                 attitude_xyzw: scene.sensor.attitude_sigma_rad.map(|_| [q.i, q.j, q.k, q.w]),
                 approach: planned.approach(),
+                ambient_c: sensor.read_ambient(reference_c + temperature::ambient_rise(&scene.plan, planned.time_s, session_s)),
                 payload_kg: Some(planned.payload_kg),
                 dwell_s: Some(planned.dwell_s),
                 ..Measurement::default()
@@ -112,7 +112,7 @@ pub fn measure(
             poses.push(TruePose::new(index, &settled, rise));
         }
     }
-    Ok((measurements, Truth { parameters, effects: truth::described(arm, &effects), poses }))
+    Ok((measurements, Truth { parameters, effects: truth::described(arm, &injected.effects), poses }))
 }
 
 fn stop(planned: &Planned) -> Stop<'_> {

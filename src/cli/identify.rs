@@ -59,8 +59,8 @@ fn from_table(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outc
     }
     let (start, real) = described(robot, options)?;
     let table = table::read(&options.input)?;
-    if !table.unused_columns.is_empty() {
-        output::note(global, &format!("note: an identification does not use {}", table.unused_columns.join(", ")));
+    if !table.conditions.is_empty() {
+        output::note(global, &format!("note: an identification does not use {}", table.conditions.join(", ")));
     }
     let (nominal, _) = session::real_robot(&start, &real).with_context(|| robot.display().to_string())?;
     check_units(&options.input, &table, &nominal)?;

@@ -305,8 +305,6 @@ fn of_sensor(scene: &Scene, case: &Case, planned: &[Planned]) -> Result<Line, Va
         length_error_m: 0.0,
         angle_error_rad: 0.0,
         parameter_errors: Vec::new(),
-        clearances: Vec::new(),
-        thermal: None,
         effects,
         noise: if outliers { Noise::Declared { factor: 1.0 } } else { Noise::Off },
     };

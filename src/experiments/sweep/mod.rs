@@ -111,7 +111,7 @@ impl Sweep {
         let structure = Subspace::of_structure(arm, file.scene.sensor.attitude_sigma_rad.is_some());
         let background = match grid.background {
             Background::Scene => injected.clone(),
-            Background::Nothing => Injected { clearances: Vec::new(), thermal: None, effects: Vec::new(), ..injected.clone() },
+            Background::Nothing => Injected { effects: Vec::new(), ..injected.clone() },
         };
         let seed = file.scene.seed;
         let sweep = Sweep { cells: ready, injected: background, whole: injected.clone(), structure, seed, header };
@@ -260,7 +260,7 @@ impl Sweep {
     ) -> Result<Vec<[f64; 6]>, SweepError> {
         let with = noiseless(scene, injected, planned).map_err(SessionError::from)?;
         // An arm without effects is its kinematics.
-        let plain = background.effects.is_empty() && background.clearances.is_empty() && background.thermal.is_none();
+        let plain = background.effects.is_empty();
         let without: Vec<Pose> = if plain {
             planned.iter().map(|planned| truly.forward(&planned.joints)).collect()
         } else {
