@@ -84,6 +84,10 @@ pub(crate) enum Command {
         Tables (CSV) and figures (SVG, PNG) go to OUT/reproduce/SCENE/."
     )]
     Reproduce(ReproduceOptions),
+    /// List the un-modelled effects that can be simulated, or check each against an independent solution
+    #[command(after_help = "Examples:\n  kincal effects                       what there is, where, in which unit and range\n  \
+        kincal effects scenes/arm8.toml      each on this arm against statics, 200 random configurations")]
+    Effects(EffectsOptions),
     /// What un-modelled effects do to a calibration: effect × place × magnitude × design × trials
     #[command(after_help = "Examples:\n  \
             kincal sweep scenes/arm8.toml --effect radial_clearance --at joint3 --magnitudes 0,10,30,60um\n  \
@@ -196,6 +200,15 @@ pub(crate) struct SceneOptions {
     /// Override a value of the scene, such as `design.count=20`; may be given again
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(crate) set: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EffectsOptions {
+    /// Scene file (TOML) whose nominal arm the effects happen to; without it they are listed
+    pub(crate) scene: Option<PathBuf>,
+    /// Random configurations per effect
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u16).range(2..=10_000))]
+    pub(crate) poses: u16,
 }
 
 #[derive(Debug, Args)]

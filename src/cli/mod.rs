@@ -5,6 +5,7 @@
 mod arguments;
 mod challenge;
 mod design;
+mod effects;
 mod export;
 mod identify;
 mod measure;
@@ -83,6 +84,7 @@ fn dispatch(arguments: &Arguments) -> anyhow::Result<Outcome> {
         Command::Identify(options) => identify::command(global, options),
         Command::Replay(options) => replay::command(global, options),
         Command::Export(options) => export::command(global, options),
+        Command::Effects(options) => effects::command(global, options),
         Command::Reproduce(options) => reproduce::command(global, options),
         Command::Sweep(options) => sweep::command(global, options),
         Command::Challenge { command } => challenge::command(global, command),

@@ -28,6 +28,8 @@ pub mod settling;
 mod static_seat;
 #[cfg(test)]
 mod test_arms;
+#[cfg(test)]
+mod tests;
 mod true_arm;
 mod world;
 
