@@ -243,7 +243,7 @@ pub fn figure(scene: &str, cells: &[CellSummary]) -> Figure {
         lines = cells.iter().map(|cell| (conditions(&cell.what).join(", "), vec![cell])).collect();
     }
     let sort = cells.iter().find_map(|cell| Sort::from_name(&cell.what.effect)).filter(|_| single);
-    let (unit, factor) = sort.map_or(("SI", 1.0), |sort| units(sort.unit())[0]);
+    let (unit, factor) = sort.map_or(("SI", 1.0), |sort| units(sort)[0]);
     let x = || {
         let what = sort.map_or("magnitude".to_owned(), |sort| sort.name().replace('_', " "));
         Axis::linear(format!("{what} ({unit})")).zero()
