@@ -14,7 +14,7 @@ use crate::recording::event::{Event, Listener, ListenerError};
 use crate::recording::truth_file::write_whole;
 use crate::recording::write::Recorder;
 use crate::report::criterion::Words;
-use crate::scene::{Criterion, DesignProblem, Injected, SceneFile};
+use crate::scene::{Criterion, DesignProblem, Injected, Scene, SceneFile};
 
 /// Reads a scene and applies the overrides of the command line.
 pub(crate) fn scene(global: &Global, options: &SceneOptions) -> anyhow::Result<SceneFile> {
@@ -70,6 +70,11 @@ pub(crate) fn check_key(global: &Global, injected: &Injected) {
 pub(crate) fn stem(global: &Global, file: &SceneFile, suffix: &str) -> String {
     let seed = global.seed.map(|seed| format!("-seed{seed}")).unwrap_or_default();
     format!("{}{seed}{suffix}", file.scene.name)
+}
+
+/// Tells what should be known of a plan before it is carried out.
+pub(crate) fn plan_notes(global: &Global, scene: &Scene, injected: &Injected) {
+    crate::cell::plan::notes(scene, injected).iter().for_each(|text| note(global, &format!("note: {text}")));
 }
 
 /// A note for people: on stderr, and not at all if they want quiet.
