@@ -242,6 +242,8 @@ fn in_plain_words(expected: &str) -> String {
         "f64" => "a number".to_owned(),
         "u64" | "usize" => "a whole number, not negative".to_owned(),
         "an array of length 3" | "array of length 3" => "a list of three numbers".to_owned(),
+        "a map" => "a table".to_owned(),
+        "a sequence" => "a list".to_owned(),
         "an array of length 2" | "array of length 2" => "a list of two".to_owned(),
         other => match other.strip_prefix("struct ") {
             Some(_) => "a table".to_owned(),
