@@ -43,6 +43,7 @@ struct Row {
     role: Role,
     joints: Vec<f64>,
     payload_kg: f64,
+    dwell_s: f64,
 }
 
 /// The order of measuring: chosen and held-out configurations and their repeats shuffled, so that neither sees only one part of a
@@ -56,6 +57,7 @@ pub fn plan(scene: &Scene, chosen: &[Vec<f64>], held_out: &[Vec<f64>]) -> Vec<Pl
             role,
             joints: joints.clone(),
             payload_kg: payloads[index % payloads.len()],
+            dwell_s: scene.plan.dwell_s,
         };
         configurations.iter().enumerate().map(row).collect::<Vec<_>>()
     };
@@ -81,6 +83,7 @@ pub fn as_measured(scene: &Scene, measurements: &[Measurement]) -> Vec<Planned> 
         role: row.role,
         joints: row.joints.clone(),
         payload_kg: row.payload_kg.unwrap_or_default(),
+        dwell_s: row.dwell_s.unwrap_or(scene.plan.dwell_s),
     };
     let times = measurements.iter().map(|row| row.time_s).collect();
     in_order(scene, measurements.iter().map(row).collect(), times)
@@ -89,13 +92,13 @@ pub fn as_measured(scene: &Scene, measurements: &[Measurement]) -> Vec<Planned> 
 /// Rows in the order of measuring, with the moves between them.
 fn in_order(scene: &Scene, rows: Vec<Row>, times: Vec<f64>) -> Vec<Planned> {
     let mut before = vec![0.0; scene.arm.joint_count()];
-    let planned = rows.into_iter().zip(times).map(|(Row { pose_id, role, joints, payload_kg }, time_s)| {
+    let planned = rows.into_iter().zip(times).map(|(Row { pose_id, role, joints, payload_kg, dwell_s }, time_s)| {
         let before = std::mem::replace(&mut before, joints.clone());
         let from = match directions(scene, pose_id) {
             Some(directions) => start_of_move(scene, &joints, &directions),
             None => before,
         };
-        Planned { pose_id, role, joints, from, payload_kg, time_s, dwell_s: scene.plan.dwell_s }
+        Planned { pose_id, role, joints, from, payload_kg, time_s, dwell_s }
     });
     planned.collect()
 }
@@ -116,13 +119,25 @@ fn directions(scene: &Scene, pose_id: usize) -> Option<Vec<bool>> {
     }
 }
 
-/// Where the last move begins; on the other side where a limit is in the way.
+/// Where the last move begins; on the other side where a limit is in the way, at the further limit where both are.
 fn start_of_move(scene: &Scene, joints: &[f64], upwards: &[bool]) -> Vec<f64> {
     let approach = &scene.plan.approach;
     let start = |((joint, upwards), of): ((&f64, &bool), &crate::kinematics::Joint)| {
         let travel = if of.kind == JointKind::Revolute { approach.travel_rad } else { approach.travel_m };
         let (below, above) = (joint - travel, joint + travel);
-        if (*upwards && below >= of.lower) || above > of.upper { below } else { above }
+        match (below >= of.lower, above <= of.upper) {
+            (true, true) => {
+                if *upwards {
+                    below
+                } else {
+                    above
+                }
+            }
+            (true, false) => below,
+            (false, true) => above,
+            (false, false) if joint - of.lower >= of.upper - joint => of.lower,
+            (false, false) => of.upper,
+        }
     };
     joints.iter().zip(upwards).zip(&scene.arm.chain.joints).map(start).collect()
 }
@@ -211,6 +226,16 @@ mod tests {
     }
 
     #[test]
+    fn moves_stay_within_the_limits_however_long_they_shall_be() {
+        let scene = scene(&[("plan.approach", "\"random\""), ("plan.approach_travel_deg", "1000")]);
+        let all = configurations(&scene, 10);
+        for row in plan(&scene, &all[..6], &all[6..]) {
+            assert!(scene.arm.within_limits(&row.from));
+            assert!(row.approach().iter().all(|direction| *direction != 0));
+        }
+    }
+
+    #[test]
     fn what_was_measured_tells_how_it_was_planned() {
         let scene = scene(&[
             ("plan.repeats", "2"),
@@ -226,6 +251,7 @@ mod tests {
             role: row.role,
             joints: row.joints.clone(),
             payload_kg: Some(row.payload_kg),
+            dwell_s: Some(row.dwell_s),
             time_s: row.time_s,
             ..Measurement::default()
         });

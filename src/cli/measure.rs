@@ -48,7 +48,7 @@ pub(crate) fn command(global: &Global, options: &MeasureOptions) -> anyhow::Resu
     cell::measure::check(scene, injected).with_context(|| options.scene.scene.display().to_string())?;
     output::check_target(&truth_path)?;
     let mut audience = Audience::open(global, &scene.arm, None, Some(&stem), &stem)?;
-    let poses = Some(outcome.configurations.len() + scene.plan.held_out_count);
+    let poses = Some(scene.plan.repeats * (outcome.configurations.len() + scene.plan.held_out_count));
     audience.take(&Event::Start(Start { poses, ..session::start_event("measure", &file.public_toml()?) }))?;
     let (measurements, truth) = session::measure_design(scene, injected, &outcome.configurations, &mut audience)?;
     super::run::truth_file(&file, &truth)?.write(&truth_path)?;
