@@ -45,6 +45,7 @@ pub(crate) fn command(global: &Global, options: &MeasureOptions) -> anyhow::Resu
     let stem = output::stem(global, &file, "-measure");
     let truth_path = global.out.join(format!("{stem}.truth.toml"));
     output::check_key(global, injected);
+    output::check_repeats(global, scene);
     cell::measure::check(scene, injected).with_context(|| options.scene.scene.display().to_string())?;
     output::check_target(&truth_path)?;
     let mut audience = Audience::open(global, &scene.arm, None, Some(&stem), &stem)?;

@@ -14,7 +14,7 @@ use crate::recording::event::{Event, Listener, ListenerError};
 use crate::recording::truth_file::write_whole;
 use crate::recording::write::Recorder;
 use crate::report::criterion::Words;
-use crate::scene::{Criterion, DesignProblem, Injected, SceneFile};
+use crate::scene::{ApproachPolicy, Criterion, DesignProblem, Injected, Scene, SceneFile};
 
 /// Reads a scene and applies the overrides of the command line.
 pub(crate) fn scene(global: &Global, options: &SceneOptions) -> anyhow::Result<SceneFile> {
@@ -62,6 +62,21 @@ pub(crate) fn check_key(global: &Global, injected: &Injected) {
             global,
             "note: injected.seed is short: whoever tries all such keys can draw the truth from the recording; `openssl rand -hex 16` \
              makes one that cannot be guessed",
+        );
+    }
+}
+
+/// Says so where a session is planned by its conditions, but no configuration is read twice.
+pub(crate) fn check_repeats(global: &Global, scene: &Scene) {
+    let plan = &scene.plan;
+    let planned = plan.temperature.is_some()
+        || plan.payloads_kg.iter().any(|payload| *payload != 0.0)
+        || plan.approach.policy != ApproachPolicy::Direct;
+    if planned && plan.repeats == 1 {
+        note(
+            global,
+            "note: no configuration is read twice: the noise cannot be estimated from repeats; plan.repeats = 2 or more reads each \
+             again",
         );
     }
 }
