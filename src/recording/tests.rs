@@ -805,7 +805,7 @@ fn check_schema(path: &str, schema: &Value, value: &Value) {
             }
         }
         "number" => assert!(value.is_number(), "{path}"),
-        "integer" => assert!(value.is_u64(), "{path}"),
+        "integer" => assert!(value.is_i64() || value.is_u64(), "{path}"),
         "string" => assert!(value.is_string(), "{path}"),
         "boolean" => assert!(value.is_boolean(), "{path}"),
         other => panic!("{path}: {other}"),
