@@ -1,8 +1,9 @@
 //! The order of measuring: which configuration is read when, from where the arm comes to it, and what it carries.
 
-use crate::kinematics::JointKind;
+use crate::kinematics::{Joint, JointKind};
 use crate::measurement::{Measurement, Role};
-use crate::scene::{ApproachPolicy, Scene};
+use crate::scene::effect::Effect;
+use crate::scene::{ApproachPolicy, Injected, Scene};
 use crate::seed::stream;
 
 /// A reading to be taken, in the order of measuring.
@@ -70,6 +71,9 @@ pub fn plan(scene: &Scene, chosen: &[Vec<f64>], held_out: &[Vec<f64>]) -> Vec<Pl
     if scene.plan.payload_blocks {
         let block = |row: &Row| payloads.iter().position(|payload| *payload == row.payload_kg);
         rows.sort_by_key(block);
+        rows.chunk_by_mut(|row, next| row.payload_kg == next.payload_kg).for_each(part_repeats);
+    } else {
+        part_repeats(&mut rows);
     }
     let times = (0..rows.len()).map(|index| index as f64 * scene.plan.seconds_per_pose).collect();
     in_order(scene, rows, times)
@@ -87,6 +91,49 @@ pub fn as_measured(scene: &Scene, measurements: &[Measurement]) -> Vec<Planned> 
     };
     let times = measurements.iter().map(|row| row.time_s).collect();
     in_order(scene, measurements.iter().map(row).collect(), times)
+}
+
+/// What should be said of a plan before it is carried out.
+#[must_use]
+pub fn notes(scene: &Scene, injected: &Injected) -> Vec<String> {
+    let mut notes = Vec::new();
+    if scene.plan.repeats == 1 {
+        notes.push(
+            "every configuration is read once, so the noise cannot be estimated from the readings and is taken as declared \
+             (plan.repeats = 2 would tell)"
+                .to_owned(),
+        );
+    }
+    let thermal = |effect: &&Effect| matches!(effect, Effect::LinkThermalGrowth { .. } | Effect::JointThermalDrift { .. });
+    if let Some(effect) = injected.effects.iter().find(thermal).filter(|_| scene.plan.temperature.is_none()) {
+        notes.push(format!("{} does nothing, because nothing warms: the plan has no [plan.temperature]", effect.name()));
+    }
+    notes
+}
+
+/// Moves readings of one configuration apart where they follow each other: without a move between them they would show the sensor's
+/// noise, not the arm's.
+fn part_repeats(rows: &mut [Row]) {
+    let count = rows.len();
+    for here in 1..count {
+        if rows[here].pose_id != rows[here - 1].pose_id {
+            continue;
+        }
+        // The next row that parts them and parts nothing else less; none where nearly all rows are of one configuration.
+        let other = (here + 1..count).chain(0..here - 1).find(|other| {
+            rows.swap(here, *other);
+            let parted = |at: usize| {
+                (at == 0 || rows[at].pose_id != rows[at - 1].pose_id)
+                    && (at + 1 == count || rows[at].pose_id != rows[at + 1].pose_id)
+            };
+            let good = parted(here) && parted(*other);
+            rows.swap(here, *other);
+            good
+        });
+        if let Some(other) = other {
+            rows.swap(here, other);
+        }
+    }
 }
 
 /// Rows in the order of measuring, with the moves between them.
@@ -122,21 +169,16 @@ fn directions(scene: &Scene, pose_id: usize) -> Option<Vec<bool>> {
 /// Where the last move begins; on the other side where a limit is in the way, at the further limit where both are.
 fn start_of_move(scene: &Scene, joints: &[f64], upwards: &[bool]) -> Vec<f64> {
     let approach = &scene.plan.approach;
-    let start = |((joint, upwards), of): ((&f64, &bool), &crate::kinematics::Joint)| {
+    let start = |((joint, upwards), of): ((&f64, &bool), &Joint)| {
         let travel = if of.kind == JointKind::Revolute { approach.travel_rad } else { approach.travel_m };
-        let (below, above) = (joint - travel, joint + travel);
-        match (below >= of.lower, above <= of.upper) {
-            (true, true) => {
-                if *upwards {
-                    below
-                } else {
-                    above
-                }
-            }
-            (true, false) => below,
-            (false, true) => above,
-            (false, false) if joint - of.lower >= of.upper - joint => of.lower,
-            (false, false) => of.upper,
+        let sides = [joint - travel, joint + travel];
+        let [wanted, other] = if *upwards { sides } else { [sides[1], sides[0]] };
+        let (below, above) = (joint - of.lower, of.upper - joint);
+        match (of.lower..=of.upper).contains(&wanted) {
+            true => wanted,
+            false if (of.lower..=of.upper).contains(&other) => other,
+            false if below > above => of.lower,
+            false => of.upper,
         }
     };
     joints.iter().zip(upwards).zip(&scene.arm.chain.joints).map(start).collect()
@@ -226,13 +268,52 @@ mod tests {
     }
 
     #[test]
-    fn moves_stay_within_the_limits_however_long_they_shall_be() {
-        let scene = scene(&[("plan.approach", "\"random\""), ("plan.approach_travel_deg", "1000")]);
-        let all = configurations(&scene, 10);
-        for row in plan(&scene, &all[..6], &all[6..]) {
-            assert!(scene.arm.within_limits(&row.from));
-            assert!(row.approach().iter().all(|direction| *direction != 0));
+    fn repeats_never_follow_each_other() {
+        for (configured, repeats) in [(2, 2), (3, 5), (20, 3), (60, 2)] {
+            for blocks in ["false", "true"] {
+                let scene = scene(&[
+                    ("plan.repeats", &repeats.to_string()),
+                    ("plan.payloads_kg", if configured > 3 { "[0, 5]" } else { "[0]" }),
+                    ("plan.payload_blocks", blocks),
+                ]);
+                let planned = plan(&scene, &configurations(&scene, configured), &[]);
+                assert_eq!(planned.len(), configured * repeats);
+                for pose_id in 0..configured {
+                    assert_eq!(planned.iter().filter(|row| row.pose_id == pose_id).count(), repeats);
+                }
+                assert!(planned.windows(2).all(|pair| pair[0].pose_id != pair[1].pose_id), "{configured} × {repeats}, {blocks}");
+                assert!(planned.iter().skip(1).all(|row| row.approach().iter().any(|direction| *direction != 0)));
+            }
         }
+        // Nothing to part them with.
+        let scene = scene(&[("plan.repeats", "3")]);
+        assert_eq!(plan(&scene, &configurations(&scene, 1), &[]).len(), 3);
+    }
+
+    #[test]
+    fn joints_with_less_room_than_the_travel_come_from_their_further_limit() {
+        let scene = scene(&[("plan.approach", "\"random\""), ("plan.approach_travel_deg", "10000")]);
+        let all = configurations(&scene, 30);
+        for row in plan(&scene, &all, &[]) {
+            for ((from, to), joint) in row.from.iter().zip(&row.joints).zip(&scene.arm.chain.joints) {
+                let further = if to - joint.lower > joint.upper - to { joint.lower } else { joint.upper };
+                assert_eq!(*from, further);
+            }
+        }
+    }
+
+    #[test]
+    fn a_plan_that_cannot_tell_the_noise_or_warms_nothing_is_told() {
+        let mut file = crate::experiments::arms::arm8().unwrap();
+        let count = |file: &crate::scene::SceneFile| notes(&file.scene, file.injected.as_ref().unwrap()).len();
+        assert!(notes(&file.scene, file.injected.as_ref().unwrap())[0].contains("plan.repeats"));
+        assert_eq!(count(&file), 1);
+        file.set("plan.repeats", "2").unwrap();
+        assert_eq!(count(&file), 0);
+        let mut text = file.toml().clone();
+        text.plan.temperature = None;
+        let cold = crate::scene::parse(&toml::to_string(&text).unwrap(), "cold").unwrap();
+        assert!(notes(&cold.scene, cold.injected.as_ref().unwrap())[0].contains("link_thermal_growth does nothing"));
     }
 
     #[test]
@@ -251,7 +332,6 @@ mod tests {
             role: row.role,
             joints: row.joints.clone(),
             payload_kg: Some(row.payload_kg),
-            dwell_s: Some(row.dwell_s),
             time_s: row.time_s,
             ..Measurement::default()
         });

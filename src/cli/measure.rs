@@ -45,11 +45,11 @@ pub(crate) fn command(global: &Global, options: &MeasureOptions) -> anyhow::Resu
     let stem = output::stem(global, &file, "-measure");
     let truth_path = global.out.join(format!("{stem}.truth.toml"));
     output::check_key(global, injected);
-    output::check_repeats(global, scene);
     cell::measure::check(scene, injected).with_context(|| options.scene.scene.display().to_string())?;
     output::check_target(&truth_path)?;
+    output::plan_notes(global, scene, injected);
     let mut audience = Audience::open(global, &scene.arm, None, Some(&stem), &stem)?;
-    let poses = Some(scene.plan.repeats * (outcome.configurations.len() + scene.plan.held_out_count));
+    let poses = Some((outcome.configurations.len() + scene.plan.held_out_count) * scene.plan.repeats);
     audience.take(&Event::Start(Start { poses, ..session::start_event("measure", &file.public_toml()?) }))?;
     let (measurements, truth) = session::measure_design(scene, injected, &outcome.configurations, &mut audience)?;
     super::run::truth_file(&file, &truth)?.write(&truth_path)?;

@@ -14,7 +14,7 @@ use crate::recording::event::{Event, Listener, ListenerError};
 use crate::recording::truth_file::write_whole;
 use crate::recording::write::Recorder;
 use crate::report::criterion::Words;
-use crate::scene::{ApproachPolicy, Criterion, DesignProblem, Injected, Scene, SceneFile};
+use crate::scene::{Criterion, DesignProblem, Injected, Scene, SceneFile};
 
 /// Reads a scene and applies the overrides of the command line.
 pub(crate) fn scene(global: &Global, options: &SceneOptions) -> anyhow::Result<SceneFile> {
@@ -66,25 +66,15 @@ pub(crate) fn check_key(global: &Global, injected: &Injected) {
     }
 }
 
-/// Says so where a session is planned by its conditions, but no configuration is read twice.
-pub(crate) fn check_repeats(global: &Global, scene: &Scene) {
-    let plan = &scene.plan;
-    let planned = plan.temperature.is_some()
-        || plan.payloads_kg.iter().any(|payload| *payload != 0.0)
-        || plan.approach.policy != ApproachPolicy::Direct;
-    if planned && plan.repeats == 1 {
-        note(
-            global,
-            "note: no configuration is read twice: the noise cannot be estimated from repeats; plan.repeats = 2 or more reads each \
-             again",
-        );
-    }
-}
-
 /// Stem of a run's files: the scene's name, with the seed where the command line changed it.
 pub(crate) fn stem(global: &Global, file: &SceneFile, suffix: &str) -> String {
     let seed = global.seed.map(|seed| format!("-seed{seed}")).unwrap_or_default();
     format!("{}{seed}{suffix}", file.scene.name)
+}
+
+/// Tells what should be known of a plan before it is carried out.
+pub(crate) fn plan_notes(global: &Global, scene: &Scene, injected: &Injected) {
+    crate::cell::plan::notes(scene, injected).iter().for_each(|text| note(global, &format!("note: {text}")));
 }
 
 /// A note for people: on stderr, and not at all if they want quiet.

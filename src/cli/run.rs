@@ -19,9 +19,9 @@ pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result
     let [truth_path, urdf_path, calibrated_path] =
         ["truth.toml", "urdf", "calibrated.urdf"].map(|extension| global.out.join(format!("{stem}.{extension}")));
     output::check_key(global, injected);
-    output::check_repeats(global, scene);
     cell::measure::check(scene, injected).with_context(|| options.scene.display().to_string())?;
     [&truth_path, &urdf_path, &calibrated_path].into_iter().try_for_each(|path| output::check_target(path))?;
+    output::plan_notes(global, scene, injected);
 
     let mut audience = Audience::open(global, &scene.arm, Some(&scene.design), Some(&stem), &stem)?;
     let run = session::run(scene, &file.public_toml()?, injected, &mut audience)?;

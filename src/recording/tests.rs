@@ -155,13 +155,13 @@ fn events(size: &Size) -> Vec<Event> {
             temperatures_c: if index % 2 == 0 { vec![22.0, 22.5] } else { Vec::new() },
             position_m: (pose.translation.vector.map(|value| value + stream.uniform(-1e-3, 1e-3))).into(),
             attitude_xyzw: (index % 3 != 0).then(|| pose.rotation.coords.into()),
-            // Some have conditions, some have none, as before there were any.
-            approach: if index % 2 == 1 { [-1, 0, 1].repeat(JOINTS / 3) } else { Vec::new() },
-            ambient_c: (index % 4 == 1).then_some(21.0 + 1.0 / 3.0),
-            payload_kg: (index % 2 == 1).then_some(0.1 * index as f64),
-            dwell_s: (index % 3 == 1).then_some(1.5),
-            session: (index % 5 == 1).then(|| "day 2, \"früh\"".to_owned()),
-            target: (index % 7 == 1).then(|| "A".to_owned()),
+            // The last one as earlier versions recorded it.
+            approach: if index + 1 < size.measurements { vec![-1, 0, 1] } else { Vec::new() },
+            ambient_c: (index % 2 == 0).then_some(21.5),
+            payload_kg: (index + 1 < size.measurements).then_some(2.5),
+            dwell_s: (index % 2 == 0).then_some(1.5),
+            session: (index % 2 == 0).then(|| "morning".to_owned()),
+            target: (index % 3 == 0).then(|| "smr 1".to_owned()),
         }));
     }
     events.push(Event::Note("fitting".to_owned()));

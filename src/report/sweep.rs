@@ -47,6 +47,11 @@ fn with_interval(mean: Option<Mean>, factor: f64, digits: usize) -> String {
     }
 }
 
+/// The coverage of the combination whose intervals hold the truth least often.
+fn lowest(cell: &CellSummary) -> Option<f64> {
+    cell.combinations.iter().map(|combination| combination.coverage).min_by(f64::total_cmp)
+}
+
 /// The table.
 #[must_use]
 pub fn sweep(cells: &[CellSummary]) -> String {
@@ -61,6 +66,7 @@ pub fn sweep(cells: &[CellSummary]) -> String {
         "in σ",
         "all in σ",
         "coverage (%)",
+        "lowest (%)",
         "residuals",
     ]);
     let rows = cells
@@ -86,6 +92,7 @@ pub fn sweep(cells: &[CellSummary]) -> String {
                 worst.map_or_else(|| "–".to_owned(), |worst| format!("{:.2}", worst.bias_in_standard_errors)),
                 cell.bias_in_standard_errors.map_or_else(|| "–".to_owned(), |bias| format!("{bias:.2}")),
                 with_interval(cell.coverage, 100.0, 1),
+                lowest(cell).map_or_else(|| "–".to_owned(), |lowest| format!("{:.0}", 100.0 * lowest)),
                 plain(cell.residual_scale, 1.0, 2),
             ]);
             row
@@ -104,7 +111,7 @@ pub fn sweep(cells: &[CellSummary]) -> String {
          Effect: how far it moves the fitted positions, RMS. Swallowed: share of its energy (in sigmas) that the fitted geometry absorbs.\n\
          Bias: identified minus true value of a combination, mean over trials; in σ: over its mean stated standard error; all: RMS over \
          combinations.\n\
-         Coverage: share of the stated 95 % intervals of the combinations that hold the true value. Residuals: over the declared noise.\n",
+         Coverage: share of the stated 95 % intervals of the combinations that hold the true value; lowest: of one combination. Residuals: over the declared noise.\n",
         fixed.join(", "),
         cells[0].trials
     ));
@@ -243,7 +250,7 @@ pub fn figure(scene: &str, cells: &[CellSummary]) -> Figure {
         lines = cells.iter().map(|cell| (conditions(&cell.what).join(", "), vec![cell])).collect();
     }
     let sort = cells.iter().find_map(|cell| Sort::from_name(&cell.what.effect)).filter(|_| single);
-    let (unit, factor) = sort.map_or(("SI", 1.0), |sort| units(sort.unit())[0]);
+    let (unit, factor) = sort.map_or(("SI", 1.0), |sort| units(sort)[0]);
     let x = || {
         let what = sort.map_or("magnitude".to_owned(), |sort| sort.name().replace('_', " "));
         Axis::linear(format!("{what} ({unit})")).zero()

@@ -59,6 +59,15 @@ pub(super) fn scene(file: &SceneToml) -> Checked<Scene> {
     }
     let design = design(&file.design, &arm, &sensor)?;
     let plan = plan(&file.plan, &arm)?;
+    let (configurations, most) = (design.count + plan.held_out_count, 1_000_000);
+    if configurations * plan.repeats > most {
+        return Err(Invalid::new(
+            "plan.repeats",
+            format!("{} readings of each of {configurations} configurations", plan.repeats),
+            format!("{most} readings at most"),
+            "measure fewer configurations, or each less often",
+        ));
+    }
     Ok(Scene {
         name: file.name.clone(),
         description: file.description.clone(),
@@ -597,6 +606,22 @@ fn temperature(file: &TemperatureToml, reference_c: f64, arm: &Arm) -> Checked<T
         lag_s: lag_s.into_iter().enumerate().map(lag).collect::<Checked<_>>()?,
         ambient_rise_k: warm_enough(file.ambient_rise_k, "the air", "plan.temperature.ambient_rise_k")?,
     })
+}
+
+/// What of the hidden part depends on the plan.
+pub(super) fn together(injected: &InjectedToml, plan: &Plan) -> Checked<()> {
+    let lightest = plan.payloads_kg.iter().fold(f64::INFINITY, |least, payload| least.min(*payload));
+    for (index, effect) in injected.effect.iter().enumerate() {
+        if let Some(excess) = effect.excess_kg.filter(|excess| excess + lightest < 0.0) {
+            return Err(Invalid::new(
+                format!("injected.effect[{}].excess_kg", index + 1),
+                excess.to_string(),
+                format!("{} or more: the tool carries {lightest} kg at least (plan.payloads_kg)", -lightest),
+                "no payload weighs less than nothing",
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// The hidden part, checked against the arm it is about.

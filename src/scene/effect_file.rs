@@ -51,10 +51,10 @@ const fn kind(
 
 /// Every kind. Those after `measurement_outliers` are not in the analyser's library.
 pub const KINDS: [KindKeys; 23] = [
-    kind("joint_compliance", Place::Joint, &["stiffness_nm_per_rad"], &[], "a spring between servo and joint"),
+    kind("joint_compliance", Place::TurningJoint, &["stiffness_nm_per_rad"], &[], "a spring between servo and joint"),
     kind("link_bending", Place::Link, &["compliance_urad_per_nm"], &[], "an elastic hinge across the joint's axis"),
-    kind("backlash", Place::Joint, &["width_arcsec"], &[], "play in a gear whose output friction holds: it lags"),
-    kind("gravity_lost_motion", Place::Joint, &["width_arcsec"], &[], "the same play, seated by gravity"),
+    kind("backlash", Place::TurningJoint, &["width_arcsec"], &[], "play in a gear whose output friction holds: it lags"),
+    kind("gravity_lost_motion", Place::TurningJoint, &["width_arcsec"], &[], "the same play, seated by gravity"),
     kind(
         "joint_eccentricity",
         Place::TurningJoint,
@@ -89,7 +89,7 @@ pub const KINDS: [KindKeys; 23] = [
     ),
     kind(
         "creep_after_motion",
-        Place::Joint,
+        Place::TurningJoint,
         &["compliance_urad_per_nm", "time_constant_s"],
         &[],
         "the joint yields slowly after a move",
@@ -111,7 +111,7 @@ pub const KINDS: [KindKeys; 23] = [
     ),
     kind(
         "hardening_stiffness",
-        Place::Joint,
+        Place::TurningJoint,
         &["stiffness_nm_per_rad", "cubic_nm_per_mrad3"],
         &[],
         "a joint that stiffens under load",
@@ -200,7 +200,7 @@ pub(super) fn effects(file: &EffectToml, key: &str, arm: &Arm) -> Checked<Vec<Ef
         }
         "gear_coupling" => {
             let source = match (&file.source, file.coupling_urad_per_rad) {
-                (Some(name), _) => joint(name, &path("source"), arm)?,
+                (Some(name), _) => source(name, at, &path("source"), arm)?,
                 (None, None) => at,
                 (None, Some(_)) => {
                     let remedy = "name the joint whose motion leaks: source = \"…\"";
@@ -320,6 +320,20 @@ fn place(file: &EffectToml, kind: &KindKeys, key: &str, arm: &Arm) -> Checked<Op
 fn joint(name: &str, key: &str, arm: &Arm) -> Checked<usize> {
     let names: Vec<&str> = arm.chain.joints.iter().map(|joint| joint.name.as_str()).collect();
     named(name, &names, key, "joint")
+}
+
+/// The joint whose motion leaks into joint `of`.
+fn source(name: &str, of: usize, key: &str, arm: &Arm) -> Checked<usize> {
+    let source = joint(name, key, arm)?;
+    let wrong =
+        |found: &str, remedy: &str| Err(Invalid::new(key, format!("{name:?}, {found}"), "another joint, one that turns", remedy));
+    if source == of {
+        return wrong("the joint that errs", "what its own gear does is ratio_error_urad_per_rad");
+    }
+    if arm.chain.joints[source].kind != JointKind::Revolute {
+        return wrong("which slides", "name another joint");
+    }
+    Ok(source)
 }
 
 /// A moving link, from 0.

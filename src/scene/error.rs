@@ -250,8 +250,19 @@ fn in_plain_words(expected: &str) -> String {
     }
 }
 
-const UNITS: [(&str, &str); 19] = [
+const UNITS: [(&str, &str); 31] = [
     ("um_per_m_per_k", "expansions are in µm per m and K"),
+    ("urad_per_rad", "errors of gears are in µrad per rad"),
+    ("urad_per_nm", "compliances are in µrad per N·m"),
+    ("rad_per_nm", ""),
+    ("urad_per_k", "drifts are in µrad per K"),
+    ("nm_per_mrad3", "this stiffness is in N·m/mrad³"),
+    ("nm_per_rad3", ""),
+    ("nm_per_rad", "stiffnesses are in N·m/rad"),
+    ("n_per_m", ""),
+    ("nm_per_deg", ""),
+    ("ppm", "scales are in parts per million"),
+    ("percent", ""),
     ("um_per_m", "growth of noise with distance is in µm per m"),
     ("kg_m2", "inertias are in kg·m²"),
     ("m_s2", "accelerations are in m/s²"),
@@ -264,7 +275,8 @@ const UNITS: [(&str, &str); 19] = [
     ("mrad", ""),
     ("urad", "small angles are in µrad"),
     ("rad", ""),
-    ("arcsec", ""),
+    ("arcsec", "errors of angles are in arc seconds"),
+    ("arcmin", ""),
     ("kg", "masses are in kg"),
     ("g", ""),
     ("k", "temperature differences are in K"),

@@ -577,7 +577,7 @@ pub struct EffectToml {
     /// Periods per turn: 1 or 2.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub order: Option<u8>,
-    /// N·m/rad (kN/m where the joint slides).
+    /// N·m/rad.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stiffness_nm_per_rad: Option<f64>,
     /// Nm/mrad³: torque per cube of the angle.

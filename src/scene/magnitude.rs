@@ -3,9 +3,16 @@
 use super::error::Invalid;
 
 /// Units at the end of keys, longer ones first, and the largest amount that is taken for meant.
-const LARGEST: [(&str, f64); 12] = [
+const LARGEST: [(&str, f64); 19] = [
     ("um_per_m_per_k", 1e6),
     ("um_per_m", 1e6),
+    ("urad_per_rad", 1e6),
+    ("urad_per_nm", 1e6),
+    ("urad_per_k", 1e6),
+    ("nm_per_mrad3", 1e9),
+    ("nm_per_rad", 1e12),
+    ("arcsec", 1e6),
+    ("ppm", 1e6),
     ("kg_m2", 1e6),
     ("m_s2", 1e3),
     ("urad", 1e6),

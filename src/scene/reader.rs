@@ -91,6 +91,7 @@ fn validated(mut toml: SceneToml, folder: Option<&Path>) -> Result<SceneFile, In
         _ => invalid,
     })?;
     let injected = toml.injected.as_ref().map(|injected| convert::injected(injected, &scene.arm)).transpose()?;
+    toml.injected.as_ref().map(|injected| convert::together(injected, &scene.plan)).transpose()?;
     Ok(SceneFile { scene, injected, toml, folder: folder.map(Path::to_owned) })
 }
 

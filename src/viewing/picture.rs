@@ -318,7 +318,10 @@ impl Picture {
         if !measurement.temperatures_c.is_empty() {
             if !self.temperatures_named {
                 self.temperatures_named = true;
-                let names = self.body.arm().links.iter().map(|link| link.name.as_str()).take(measurement.temperatures_c.len());
+                // The base link has no sensor.
+                let links = &self.body.arm().links;
+                let first = links.len().saturating_sub(measurement.temperatures_c.len());
+                let names = links.iter().skip(first).map(|link| link.name.as_str());
                 stream.log_static("temperatures", &SeriesLines::new().with_names(names.collect::<Vec<_>>()))?;
             }
             stream.log("temperatures", &Scalars::new(measurement.temperatures_c.iter().copied()))?;

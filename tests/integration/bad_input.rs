@@ -122,6 +122,87 @@ fn overrides_that_are_wrong() {
     }
 }
 
+/// Overrides of the scene with the play, each with what the message says. That of a file is tried where scenes are parsed.
+const PLANS_AND_EFFECTS: [(&str, &[&str]); 36] = [
+    ("plan.repeats=0", &["plan.repeats", "1 or more"]),
+    ("plan.repeats=2.5", &["plan.repeats", "a whole number"]),
+    ("plan.repeat=2", &["did you mean `repeats`?"]),
+    ("plan.approach=sideways", &["plan.approach", "direct, up, down, alternate, random"]),
+    ("plan.approach_travel_deg=0", &["plan.approach_travel_deg", "more than 0"]),
+    ("plan.approach_travel_rad=0.1", &["did you mean `approach_travel_deg`?"]),
+    ("plan.dwell_s=-1", &["plan.dwell_s", "0 or more"]),
+    ("plan.dwell_s=21", &["plan.dwell_s", "20 at most"]),
+    ("plan.payloads_kg=[]", &["plan.payloads_kg", "[0]"]),
+    ("plan.payloads_kg=[0,-5]", &["plan.payloads_kg", "0 or more"]),
+    ("plan.payloads_kg=5", &["plan.payloads_kg", "a list"]),
+    ("plan.temperature.profile=cool", &["plan.temperature.profile", "constant, warm-up, heat-and-cool"]),
+    ("plan.temperature.rise_k=[1,2]", &["plan.temperature.rise_k", "9"]),
+    ("plan.temperature.rise_k=-300", &["plan.temperature.rise_k", "absolute zero"]),
+    ("plan.temperature.ambient_rise_k=-294", &["plan.temperature.ambient_rise_k", "absolute zero"]),
+    ("plan.reference_temperature_c=-274", &["plan.reference_temperature_c", "more than -273.15"]),
+    ("plan.temperature.lag_s=-1", &["plan.temperature.lag_s", "0 or more"]),
+    ("plan.temperature.lag_s=[1,2,3]", &["plan.temperature.lag_s", "9"]),
+    ("injected.effect[1].kind=wear", &["injected.effect[1].kind", "joint_compliance, link_bending, backlash"]),
+    ("injected.effect[1].joint=joint9", &["injected.effect[1].joint", "joint1, joint2"]),
+    ("injected.effect[1].radial_um=-30", &["injected.effect[1].radial_um", "0 or more"]),
+    ("injected.effect[1].radial_um=1001", &["injected.effect[1].radial_um", "1000 at most"]),
+    ("injected.effect[1].radial_um=\"thick\"", &["injected.effect[1].radial_um", "a number"]),
+    ("injected.effect[1].width_arcsec=90", &["injected.effect[1].width_arcsec", "radial_clearance", "kind, joint, radial_um"]),
+    ("injected.effect[1].colour=3", &["unknown key `colour`"]),
+    ("injected.effect[2].radial_um=3", &["no `effect[2]`"]),
+    (
+        "injected.effect=[{kind=\"joint_compliance\",joint=\"joint2\",stiffness_nm_per_rad=0}]",
+        &["stiffness_nm_per_rad", "more than 0"],
+    ),
+    (
+        "injected.effect=[{kind=\"joint_compliance\",joint=\"joint2\",stiffness_nm_per_rad=-9}]",
+        &["stiffness_nm_per_rad", "more than 0"],
+    ),
+    ("injected.effect=[{kind=\"joint_compliance\",joint=\"joint2\",stiffness_nm_per_rad=9}]", &["joint_compliance", "100"]),
+    ("injected.effect=[{kind=\"tilt_clearance\",joint=\"joint2\",tilt_urad=10001}]", &["tilt_urad", "10000 at most"]),
+    (
+        "injected.effect=[{kind=\"gear_coupling\",joint=\"joint2\",coupling_urad_per_rad=9,source=\"joint2\"}]",
+        &["injected.effect[1].source", "the joint that errs"],
+    ),
+    (
+        "injected.effect=[{kind=\"wrong_payload\",excess_kg=-1,stiffness_nm_per_rad=2e4}]",
+        &["injected.effect[1].excess_kg", "0 or more"],
+    ),
+    (
+        "injected.effect=[{kind=\"joint_compliance\",joint=\"joint2\",stiffness_nm_per_mrad=9}]",
+        &["did you mean `stiffness_nm_per_rad`?"],
+    ),
+    ("injected.clearance=[{joint=\"joint2\",radial_um=30}]", &["injected.clearance", "kind = \"clearance\""]),
+    ("injected.thermal={rise_k=3}", &["injected.thermal", "[plan.temperature]"]),
+    ("injected.thermal.rise_k=3", &["injected.thermal"]),
+];
+
+#[test]
+fn plans_and_effects_that_are_wrong() {
+    for (assignment, expected) in PLANS_AND_EFFECTS {
+        refuse(&["run", "scenes/gap.toml", "--set", assignment], expected);
+    }
+    // Sliding joints have neither gears nor encoders that turn.
+    let slide = ["arm.frame[3].joint={name=\"slide\",kind=\"prismatic\",lower_mm=0,upper_mm=100}"];
+    for effect in [
+        "kind=\"backlash\",joint=\"slide\",width_arcsec=60",
+        "kind=\"joint_compliance\",joint=\"slide\",stiffness_nm_per_rad=2e4",
+    ] {
+        let effect = format!("injected.effect=[{{{effect}}}]");
+        let none = ["--set", "injected.effect=[]", "--set", slide[0], "--set", &effect];
+        refuse(&[&["run", "scenes/gap.toml"], &none[..]].concat(), &["injected.effect[1].joint", "\"slide\", which slides"]);
+    }
+}
+
+#[test]
+fn what_a_plan_cannot_tell_is_noted() {
+    let folder = tempfile::tempdir().unwrap();
+    let quick = ["--set", "design.method=random", "--set", "design.random_sets=1", "--set", "design.pool=60"];
+    let run = |more: &[&str]| kincal(folder.path(), &[&["run", "scenes/gap.toml"], &quick[..], more].concat()).ends(0).stderr;
+    assert!(!run(&[]).contains("note: every configuration is read once"));
+    assert!(run(&["--set", "plan.repeats=1"]).contains("note: every configuration is read once"));
+}
+
 #[test]
 fn numbers_beyond_all_measure_are_refused_at_once() {
     for assignment in [
@@ -277,7 +358,7 @@ fn tables_that_are_wrong() {
     with(value("role", "test"), &["line 3", "`fit` or `held_out`"]);
     with(value("pose_id", "-1"), &["line 3", "a whole number"]);
     with(value("qw", "7"), &["line 3", "quaternion"]);
-    with([&rows[..3], &["1,2,3"], &rows[3..]].concat().join("\n"), &["line 4", "3 values", "26 columns"]);
+    with([&rows[..3], &["1,2,3"], &rows[3..]].concat().join("\n"), &["line 4", "3 values", "37 columns"]);
     let same: Vec<&str> = std::iter::once(rows[0])
         .chain(std::iter::repeat_n(*rows.iter().find(|row| row.contains(",fit,")).unwrap(), 60))
         .collect();

@@ -237,3 +237,57 @@ fn what_is_no_recording_is_named_for_what_it_is() {
         assert_eq!(ran.stderr.matches(name).count(), 1, "{}", ran.stderr);
     }
 }
+
+#[test]
+fn a_measurement_with_conditions_is_measured_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    let path = |name: &str| out.join(name).to_str().unwrap().to_owned();
+    let quick = [
+        "--set",
+        "design.method=random",
+        "--set",
+        "design.random_sets=1",
+        "--set",
+        "design.pool=60",
+        "--set",
+        "plan.held_out_count=7",
+        "--set",
+        "design.count=12",
+        "--set",
+        "plan.seconds_per_pose=7.3",
+        "--set",
+        "injected.effect=[{kind=\"backlash\",joint=\"joint3\",\
+        width_arcsec=60},{kind=\"joint_compliance\",joint=\"joint2\",stiffness_nm_per_rad=2e4},{kind=\"link_thermal_growth\",\
+        expansion_um_per_m_per_k=23}]",
+    ];
+    for (approach, blocks) in [("random", "false"), ("direct", "true")] {
+        let (approach, blocks) = (format!("plan.approach={approach}"), format!("plan.payload_blocks={blocks}"));
+        let more = [&quick[..], &["--set", &approach, "--set", &blocks]].concat();
+        kincal(out, &[&["design", "scenes/gap.toml"], &more[..]].concat()).ends(0);
+        kincal(out, &[&["measure", "scenes/gap.toml", "--design", &path("gap-design.mcap")], &more[..]].concat()).ends(0);
+        let measurements: Vec<serde_json::Value> = crate::harness::messages(&out.join("gap-measure.mcap"))
+            .into_iter()
+            .filter(|(topic, _)| topic == "/measurement")
+            .map(|(_, bytes)| serde_json::from_slice(&bytes).unwrap())
+            .collect();
+        assert_eq!(measurements.len(), 38);
+        let loaded = measurements.iter().filter(|row| row["payload_kg"] == 5.0).count();
+        assert_eq!(loaded, 2 * (12 / 2 + 7 / 2));
+        assert!(measurements.iter().all(|row| row["ambient_c"].is_f64() && row["dwell_s"] == 2.0));
+        let truth = path("gap-measure.truth.toml");
+        let json = kincal(out, &["replay", &path("gap-measure.mcap"), "--truth", &truth, "--json"]).ends(0).json();
+        assert_eq!((&json["identical"], &json["truth_identical"]), (&true.into(), &true.into()));
+        // The beginning of a session knows how long it would have been.
+        let bytes = fs::read(path("gap-measure.mcap")).unwrap();
+        fs::write(path("cut.mcap"), &bytes[..bytes.len() * 2 / 3]).unwrap();
+        let json = kincal(out, &["replay", &path("cut.mcap"), "--truth", &truth, "--json"]).ends(2).json();
+        assert!(json["first_difference"].is_null() && json["messages_compared"].as_u64().unwrap() > 100, "{json}");
+        // What the table says of its conditions is what the recording says.
+        kincal(out, &["export", &path("gap-measure.mcap"), "--to", "csv"]).ends(0);
+        let table = fs::read_to_string(path("gap-measure.csv")).unwrap();
+        for column in ["approach8", "temp_ambient_c", "temp8_c", "payload_kg", "dwell_s"] {
+            assert!(table.lines().next().unwrap().split(',').any(|name| name == column), "{column}");
+        }
+    }
+}

@@ -198,7 +198,7 @@ fn what_cannot_be_swept_is_refused_before_anything_is_written() {
         (&["--effect", "rust"][..], "no such effect; there are joint_compliance"),
         (&["--effect", "backlash", "--at", "joint9"], "this arm has joint1"),
         (&["--effect", "backlash", "--magnitudes", "30"], "the unit of `30` is missing"),
-        (&["--effect", "backlash", "--magnitudes", "30um"], "no unit of backlash; allowed: urad"),
+        (&["--effect", "backlash", "--magnitudes", "30um"], "no unit of backlash; allowed: µrad, urad"),
         (&["--effect", "backlash", "--magnitudes", "-3urad"], "must be finite and not negative"),
         (&["--effect", "radial_clearance", "--magnitudes", "30mm"], "is no fault but another machine"),
         (&["--effect", "backlash", "--approach", "sideways"], "there are direct, up, down, alternate, random"),

@@ -17,7 +17,7 @@ use crate::measurement::Measurement;
 use crate::recording::event::{Event, Listener, Nobody, Start};
 use crate::recording::write::Recorder;
 use crate::scene::effect::Effect;
-use crate::scene::{Injected, Noise, SceneFile};
+use crate::scene::{Injected, Noise, SceneFile, Temperature};
 use crate::seed::{Stream, hidden_key, hidden_stream};
 use crate::session::{SessionError, start_event};
 
@@ -27,6 +27,8 @@ const PARAMETER_ERRORS: [f64; 2] = [1e-3, 0.2 * std::f64::consts::PI / 180.0];
 const TAILS: Tails = Tails { share: 0.05, factor: 5.0 };
 /// Noise that is larger than declared is so many times as large.
 const UNDERSTATED: f64 = 1.3;
+/// Course of the temperature.
+const COURSE: &str = "heat-and-cool";
 /// Payloads that take turns, kg.
 const PAYLOADS_KG: [f64; 2] = [0.0, 4.0];
 
@@ -172,17 +174,18 @@ pub fn public(base: &SceneFile, options: &Options, key: &[u8; 32], index: usize)
     Ok(Public { file, planned })
 }
 
-/// Random approach, heat and cool with a lag for each link, payloads that take turns, two readings of some configurations.
+/// Random approach, heat and cool with a lag for each link, payloads that take turns, two readings of some configurations: whatever
+/// the scene's own plan is.
 fn conditions(file: &mut SceneFile, options: &Options) -> Result<(), ChallengeError> {
     let session_s = options.poses as f64 * file.scene.plan.seconds_per_pose;
-    let course = course("heat-and-cool", &file.scene.arm, session_s);
     file.set("plan.approach", "\"random\"")?;
     file.set("plan.payloads_kg", &format!("{PAYLOADS_KG:?}"))?;
+    file.set("plan.payload_blocks", "false")?;
     file.set("plan.repeats", if options.repeats > 0 { "2" } else { "1" })?;
-    if let Some(course) = course {
-        let (rise, lag, air) = (course.rise_k, course.lag_s, course.ambient_rise_k);
-        let table = format!("{{ profile = \"heat-and-cool\", rise_k = {rise:?}, lag_s = {lag:?}, ambient_rise_k = {air:?} }}");
-        file.set("plan.temperature", &table)?;
+    if let Some(Temperature { rise_k, lag_s, ambient_rise_k, .. }) = course(COURSE, &file.scene.arm, session_s) {
+        let course =
+            format!("{{ profile = \"{COURSE}\", rise_k = {rise_k:?}, lag_s = {lag_s:?}, ambient_rise_k = {ambient_rise_k:?} }}");
+        file.set("plan.temperature", &course)?;
     }
     Ok(())
 }

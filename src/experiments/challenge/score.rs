@@ -330,8 +330,12 @@ fn of_foreign(truths: &[CaseTruth], verdicts: &[Verdict], foreign: &dyn Fn(&True
             continue;
         };
         let row = usize::from(effect.lambda.is_some_and(|lambda| lambda >= FLAGGED_FROM));
-        let misnamed =
-            named(verdict).iter().any(|claim| !truth.effects.iter().any(|effect| !foreign(effect) && effect.kind == claim.kind));
+        // A payload that is wrong shows because every joint yields: who says that they do is not wrong.
+        let yields = truth.effects.iter().any(|effect| effect.kind == "wrong_payload");
+        let there = |kind: &str| {
+            truth.effects.iter().any(|effect| !foreign(effect) && effect.kind == kind) || yields && kind == "joint_compliance"
+        };
+        let misnamed = named(verdict).iter().any(|claim| !there(&claim.kind));
         for row in [row, 2] {
             rows[row].cases += 1;
             rows[row].flagged += usize::from(flagged(verdict));

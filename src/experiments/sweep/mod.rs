@@ -62,6 +62,9 @@ pub struct Sweep {
     header: Header,
 }
 
+/// A scene with the configurations that were chosen for it.
+type Chosen = (Scene, Vec<Vec<f64>>);
+
 /// A cell with what is the same in all its trials.
 struct Ready {
     cell: Cell,
@@ -79,7 +82,7 @@ impl Sweep {
     /// If a value of the grid does not fit the scene, or no configuration may be measured.
     pub fn new(file: &SceneFile, injected: &Injected, grid: &Grid, watcher: &dyn Watcher) -> Result<Sweep, SweepError> {
         let cells = grid.cells();
-        let mut sets: BTreeMap<(usize, Method), (Scene, Vec<Vec<f64>>)> = BTreeMap::new();
+        let mut sets: BTreeMap<(usize, Method), Chosen> = BTreeMap::new();
         let wanted: std::collections::BTreeSet<_> = cells.iter().map(|cell| (cell.poses, cell.method)).collect();
         watcher.begin("choosing", wanted.len());
         for (poses, method) in wanted {
