@@ -4,8 +4,10 @@
 
 mod arguments;
 mod design;
+mod diagnose;
 mod export;
 mod identify;
+mod input;
 mod measure;
 mod output;
 mod replay;
@@ -68,7 +70,7 @@ fn dispatch(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if let Some(threads) = global.threads {
         rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global()?;
     }
-    if let (Some(seed), Command::Identify(_) | Command::Replay(_) | Command::Export(_)) = (global.seed, &arguments.command) {
+    if let (Some(seed), Command::Diagnose(_) | Command::Identify(_) | Command::Replay(_) | Command::Export(_)) = (global.seed, &arguments.command) {
         ensure!(
             false,
             "--seed {seed}: this command draws nothing; leave it out, or give it to run, design, measure, reproduce or sweep"
@@ -79,6 +81,7 @@ fn dispatch(arguments: &Arguments) -> anyhow::Result<Outcome> {
         Command::Run(options) => run::command(global, options),
         Command::Design(options) => design::command(global, options),
         Command::Measure(options) => measure::command(global, options),
+        Command::Diagnose(options) => diagnose::command(global, options),
         Command::Identify(options) => identify::command(global, options),
         Command::Replay(options) => replay::command(global, options),
         Command::Export(options) => export::command(global, options),

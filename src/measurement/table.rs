@@ -56,7 +56,22 @@ enum Column {
     Quaternion { component: usize },
     Role,
     Temperature { sensor: usize },
-    Unused,
+    Ambient,
+    Payload,
+    Dwell,
+    Target,
+    Session,
+    Approach { joint: usize },
+}
+
+impl Column {
+    /// Whether only the diagnosis uses it.
+    fn is_a_condition(self) -> bool {
+        matches!(
+            self,
+            Column::Ambient | Column::Payload | Column::Dwell | Column::Target | Column::Session | Column::Approach { .. }
+        )
+    }
 }
 
 const ALLOWED: &str = "pose_id, time_s, q1_rad… (or _deg, _m, _mm), x_m, y_m, z_m (or _mm), qx, qy, qz, qw, role, target, \
@@ -104,6 +119,7 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
             temperatures_c: vec![0.0; layout.sensors],
             position_m: [0.0; 3],
             attitude_xyzw: layout.attitude.then_some([0.0; 4]),
+            approach: vec![0; layout.approaches],
             ..Measurement::default()
         };
         for ((column, text), name) in columns.iter().zip(record.iter()).zip(header.iter()) {
@@ -137,7 +153,19 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
                     }
                 }
                 Column::Temperature { sensor } => row.temperatures_c[*sensor] = number()?,
-                Column::Unused => {}
+                Column::Ambient => row.ambient_c = Some(number()?),
+                Column::Payload => row.payload_kg = Some(number()?),
+                Column::Dwell => row.dwell_s = Some(number()?),
+                Column::Target => row.target = Some(text.to_owned()),
+                Column::Session => row.session = Some(text.to_owned()),
+                Column::Approach { joint } => {
+                    row.approach[*joint] = match number()? {
+                        value if value == -1.0 => -1,
+                        value if value == 0.0 => 0,
+                        value if value == 1.0 => 1,
+                        _ => return Err(wrong(line, format!("`{name}` is `{text}`; -1, 0 or 1 is needed"))),
+                    }
+                }
             }
         }
         if let Some(quaternion) = &mut row.attitude_xyzw {
@@ -156,7 +184,7 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
         return Err(wrong(header_line, "the table has a header but no rows".to_owned()));
     }
     let unused_columns =
-        header.iter().zip(&columns).filter(|(_, column)| **column == Column::Unused).map(|(name, _)| name.to_owned()).collect();
+        header.iter().zip(&columns).filter(|(_, column)| column.is_a_condition()).map(|(name, _)| name.to_owned()).collect();
     let mut joint_is_length = vec![false; layout.joints];
     for column in &columns {
         if let Column::Joint { joint, is_length, .. } = column {
@@ -196,6 +224,7 @@ struct Layout {
     joints: usize,
     sensors: usize,
     attitude: bool,
+    approaches: usize,
 }
 
 impl Layout {
@@ -238,7 +267,15 @@ impl Layout {
         .map_err(|missing| {
             format!("temperature columns must be temp1_c, temp2_c, … without a gap: temp{}_c is missing", missing + 1)
         })?;
-        Ok(Layout { joints, sensors, attitude })
+        let approaches = numbered(columns, |column| match column {
+            Column::Approach { joint } => Some(*joint),
+            _ => None,
+        })
+        .map_err(|missing| format!("approach columns must be approach1, approach2, … without a gap: approach{} is missing", missing + 1))?;
+        if approaches != 0 && approaches != joints {
+            return Err(format!("{approaches} approach columns for {joints} joints; approach1 to approach{joints} are needed, or none"));
+        }
+        Ok(Layout { joints, sensors, attitude, approaches })
     }
 }
 
@@ -258,7 +295,11 @@ fn column(name: &str) -> Result<Column, String> {
         "pose_id" => Some(Column::PoseId),
         "time_s" => Some(Column::Time),
         "role" => Some(Column::Role),
-        "target" | "temp_ambient_c" | "payload_kg" | "dwell_s" | "session" => Some(Column::Unused),
+        "target" => Some(Column::Target),
+        "temp_ambient_c" => Some(Column::Ambient),
+        "payload_kg" => Some(Column::Payload),
+        "dwell_s" => Some(Column::Dwell),
+        "session" => Some(Column::Session),
         _ => None,
     };
     if let Some(column) = fixed {
@@ -276,7 +317,10 @@ fn column(name: &str) -> Result<Column, String> {
         };
     }
     if let Some(rest) = name.strip_prefix("approach") {
-        return if rest.parse::<usize>().is_ok_and(|joint| joint > 0) { Ok(Column::Unused) } else { unknown() };
+        return match rest.parse::<usize>() {
+            Ok(joint @ 1..=1000) => Ok(Column::Approach { joint: joint - 1 }),
+            _ => unknown(),
+        };
     }
     if let Some(rest) = name.strip_prefix("temp") {
         return match rest.strip_suffix("_c").and_then(|number| number.parse().ok()) {

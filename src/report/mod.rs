@@ -1,5 +1,6 @@
 //! Results as tables and figures for people. Units are in the headers; machines get the same results as JSON.
 
+pub mod diagnosis;
 pub mod findings;
 pub mod sweep;
 
