@@ -2,7 +2,7 @@
 
 use crate::arm::Arm;
 use crate::cell::measure::MeasureError;
-use crate::cell::plan::{Planned, in_order, plan};
+use crate::cell::plan::{as_measured, plan};
 use crate::cell::{Truth, measure};
 use crate::design::candidates::NothingMeasurable;
 use crate::design::outcome::DesignOutcome;
@@ -236,7 +236,13 @@ pub fn replay(
                 (Some(injected), Subject::Scene(scene)) if measured.is_none() => {
                     let planned = match &chosen {
                         Some(chosen) => plan(scene, chosen, &design::held_out(scene)?),
-                        None => planned_as_recorded(scene, recorded),
+                        None => {
+                            let rows = recorded.iter().filter_map(|event| match event {
+                                Event::Measured(measurement) => Some(measurement.clone()),
+                                _ => None,
+                            });
+                            as_measured(scene, &rows.collect::<Vec<_>>())
+                        }
                     };
                     // A recording that was cut off holds fewer poses than the session had.
                     let session = recorded.iter().find_map(|event| match event {
@@ -262,13 +268,4 @@ pub fn replay(
         }
     }
     Ok(truth)
-}
-
-/// The plan that a recording without a design was measured by.
-fn planned_as_recorded(scene: &Scene, recorded: &[Event]) -> Vec<Planned> {
-    let rows = recorded.iter().filter_map(|event| match event {
-        Event::Measured(measurement) => Some((measurement.pose_id, measurement.role, measurement.joints.clone())),
-        _ => None,
-    });
-    in_order(scene, rows.collect())
 }

@@ -7,6 +7,8 @@
 mod bad_input;
 #[path = "integration/chain.rs"]
 mod chain;
+#[path = "integration/challenge.rs"]
+mod challenge;
 #[path = "integration/determinism.rs"]
 mod determinism;
 #[path = "integration/harness.rs"]
@@ -29,5 +31,7 @@ mod reproduce;
 mod secrecy;
 #[path = "integration/steps.rs"]
 mod steps;
+#[path = "integration/sweep.rs"]
+mod sweep;
 #[path = "integration/urdf_scene.rs"]
 mod urdf_scene;

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::plan::Planned;
 use super::sensor::SimulatedSensor;
+use super::temperature;
 use super::truth::{self, TruePose, Truth};
 use crate::measurement::{Measurement, Role};
 use crate::physics::{Conditions, PhysicalArm, PhysicsError, Settled, Settling, Stop};
@@ -31,7 +32,7 @@ pub enum MeasureError {
 pub fn check(scene: &Scene, injected: &Injected) -> Result<(), PhysicsError> {
     let parameters = truth::parameters(&scene.arm, injected, scene.seed);
     let values: Vec<f64> = parameters.iter().map(|parameter| parameter.true_value).collect();
-    PhysicalArm::new(&scene.arm, &values, &truth::effects(injected), Settling::default()).map(drop)
+    PhysicalArm::new(&scene.arm, &values, &injected.effects, Settling::default()).map(drop)
 }
 
 /// Measures `planned` on the true arm that `injected` makes of the scene's, telling `listener` every measurement.
@@ -54,22 +55,20 @@ pub fn measure(
     let arm = &scene.arm;
     let parameters = truth::parameters(arm, injected, scene.seed);
     let values: Vec<f64> = parameters.iter().map(|parameter| parameter.true_value).collect();
-    let effects = truth::effects(injected);
-    let new_arm = || PhysicalArm::new(arm, &values, &effects, Settling::default());
+    let new_arm = || PhysicalArm::new(arm, &values, &injected.effects, Settling::default());
     let stops: Vec<Stop> = planned.iter().map(stop).collect();
     let session_s = session_s(scene, planned, session_poses);
     let mut sensor = SimulatedSensor::new(&scene.sensor, injected, scene.seed);
 
     let mut measurements = Vec::with_capacity(planned.len());
     let mut poses = Vec::with_capacity(planned.len());
-    let last = session_poses.saturating_sub(1).max(1) as f64;
     for (batch, chunk) in planned.chunks(BATCH).enumerate() {
         let settled: Vec<(Settled, Vec<f64>)> = chunk
             .par_iter()
             .enumerate()
             .map_init(new_arm, |physical, (offset, planned)| {
                 let index = batch * BATCH + offset;
-                let rise = truth::temperature_rise(arm, injected, index as f64 / last);
+                let rise = temperature::rises(&scene.plan, arm.links.len(), planned.time_s, session_s);
                 let conditions = Conditions {
                     joints: &planned.joints,
                     from: &planned.from,
@@ -103,6 +102,7 @@ pub fn measure(
                 position_m: pose.translation.vector.into(),
                 attitude_xyzw: scene.sensor.attitude_sigma_rad.map(|_| [q.i, q.j, q.k, q.w]),
                 approach: planned.approach(),
+                ambient_c: sensor.read_ambient(reference_c + temperature::ambient_rise(&scene.plan, planned.time_s, session_s)),
                 payload_kg: Some(planned.payload_kg),
                 dwell_s: Some(planned.dwell_s),
                 ..Measurement::default()
@@ -112,7 +112,7 @@ pub fn measure(
             poses.push(TruePose::new(index, &settled, rise));
         }
     }
-    Ok((measurements, Truth { parameters, effects: truth::described(arm, &effects), poses }))
+    Ok((measurements, Truth { parameters, effects: truth::described(arm, &injected.effects), poses }))
 }
 
 fn stop(planned: &Planned) -> Stop<'_> {
@@ -129,4 +129,87 @@ fn stop(planned: &Planned) -> Stop<'_> {
 fn session_s(scene: &Scene, planned: &[Planned], poses: usize) -> f64 {
     let known = planned.last().map_or(0.0, |planned| planned.time_s);
     known + poses.saturating_sub(planned.len()) as f64 * scene.plan.seconds_per_pose
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::Level;
+    use crate::experiments::effect_validation::session;
+    use crate::recording::event::Nobody;
+    use crate::scene::Noise;
+    use crate::scene::effect::{Effect, Moves};
+    use nalgebra::Vector3;
+
+    fn injected(effects: Vec<Effect>) -> (Scene, Injected) {
+        let file = crate::scene::read(std::path::Path::new("scenes/arm8.toml")).unwrap();
+        let injected = Injected { effects, ..file.injected.unwrap() };
+        (file.scene, injected)
+    }
+
+    fn remembering() -> Vec<Effect> {
+        let shift = Vector3::new(3e-5, 0.0, -2e-5);
+        vec![
+            Effect::JointCompliance { joint: 1, stiffness: 2e4 },
+            Effect::Backlash { joint: 2, width: 3e-4 },
+            Effect::CreepAfterMotion { joint: 3, compliance: 1e-5, time_constant: 50.0 },
+            Effect::MemoryHysteresis { joint: 4, amplitude: 3e-4, travel: 0.2 },
+            Effect::BaseStep { moves: Moves::Sensor, translation: shift, rotation: shift, after: 0.5 },
+            Effect::MeasurementOutliers { share: 0.1, factor: 8.0 },
+        ]
+    }
+
+    #[test]
+    fn rows_carry_their_conditions_and_the_truth_its_effects() {
+        let (scene, injected) = injected(remembering());
+        let planned = session(&scene.arm, 20, 3);
+        let (measurements, truth) = measure(&scene, &injected, &planned, planned.len(), &mut Nobody).unwrap();
+        for (measurement, planned) in measurements.iter().zip(&planned) {
+            assert_eq!(measurement.approach, planned.approach());
+            assert!(measurement.approach.iter().all(|direction| *direction != 0));
+            assert_eq!((measurement.payload_kg, measurement.dwell_s), (Some(planned.payload_kg), Some(planned.dwell_s)));
+        }
+        let backlash = truth.effects.iter().find(|effect| effect.kind == "backlash").unwrap();
+        assert_eq!((backlash.level, backlash.number, backlash.magnitude), (Level::Joint, Some(3), 3e-4));
+        assert_eq!(backlash.unit, "rad");
+        let compliance = truth.effects.iter().find(|effect| effect.kind == "joint_compliance").unwrap();
+        assert_eq!((compliance.magnitude, compliance.unit.as_str()), (1.0 / 2e4, "rad/(N·m)"));
+        assert!(truth.poses.iter().all(|pose| pose.settled && pose.yields.len() == 3));
+    }
+
+    /// More rows than a batch: what a row remembers is its session's, however many rows settle side by side, and the beginning of a
+    /// session is the same whether or not it goes on.
+    #[test]
+    fn a_row_depends_on_those_before_it_and_on_nothing_else() {
+        let (scene, injected) = injected(remembering());
+        let planned = session(&scene.arm, BATCH + 20, 4);
+        let run = |threads, rows: &[Planned]| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| measure(&scene, &injected, rows, planned.len(), &mut Nobody).unwrap())
+        };
+        let (whole, truth) = run(3, &planned);
+        assert_eq!(run(1, &planned), (whole.clone(), truth.clone()));
+        let cut = BATCH + 7;
+        let (beginning, its_truth) = run(2, &planned[..cut]);
+        assert_eq!(beginning[..], whole[..cut]);
+        assert_eq!(its_truth.poses[..], truth.poses[..cut]);
+    }
+
+    /// The streams of noise have their labels from before there were effects.
+    #[test]
+    fn effects_of_the_arm_leave_the_noise_as_it_is() {
+        let (scene, plain) = injected(Vec::new());
+        let planned = session(&scene.arm, 10, 5);
+        let arm = Injected { effects: vec![Effect::JointCompliance { joint: 1, stiffness: 2e4 }], ..plain.clone() };
+        let noise = |injected: &Injected| {
+            let read = measure(&scene, injected, &planned, planned.len(), &mut Nobody).unwrap().0;
+            let silent = Injected { noise: Noise::Off, ..injected.clone() };
+            let still = measure(&scene, &silent, &planned, planned.len(), &mut Nobody).unwrap().0;
+            read.iter().zip(still).map(|(read, still)| read.position() - still.position()).collect::<Vec<_>>()
+        };
+        for (with, without) in noise(&arm).iter().zip(noise(&plain)) {
+            // The noise grows with the distance, which has changed by a millimetre in two metres.
+            assert!((with - without).norm() < 1e-3 * without.norm(), "{with} instead of {without}");
+        }
+    }
 }

@@ -5,6 +5,7 @@
 pub mod measure;
 pub mod plan;
 mod sensor;
+pub mod temperature;
 pub mod truth;
 
 pub use measure::{MeasureError, measure};

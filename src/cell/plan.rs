@@ -1,7 +1,8 @@
 //! The order of measuring: which configuration is read when, from where the arm comes to it, and what it carries.
 
-use crate::measurement::Role;
-use crate::scene::Scene;
+use crate::kinematics::JointKind;
+use crate::measurement::{Measurement, Role};
+use crate::scene::{ApproachPolicy, Scene};
 use crate::seed::stream;
 
 /// A reading to be taken, in the order of measuring.
@@ -36,24 +37,198 @@ impl Planned {
     }
 }
 
-/// The order of measuring: chosen and held-out configurations shuffled, so that neither sees only one part of a drift.
-#[must_use]
-pub fn plan(scene: &Scene, chosen: &[Vec<f64>], held_out: &[Vec<f64>]) -> Vec<Planned> {
-    let mut rows: Vec<(usize, Role, Vec<f64>)> = Vec::with_capacity(chosen.len() + held_out.len());
-    rows.extend(chosen.iter().enumerate().map(|(index, joints)| (index, Role::Fit, joints.clone())));
-    rows.extend(held_out.iter().enumerate().map(|(index, joints)| (chosen.len() + index, Role::HeldOut, joints.clone())));
-    stream(scene.seed, "plan/order").shuffle(&mut rows);
-    in_order(scene, rows)
+/// A reading before it is known what comes before it.
+struct Row {
+    pose_id: usize,
+    role: Role,
+    joints: Vec<f64>,
+    payload_kg: f64,
 }
 
-/// Rows that are already in the order of measuring.
+/// The order of measuring: chosen and held-out configurations and their repeats shuffled, so that neither sees only one part of a
+/// drift; with `payload_blocks` one payload after the other, shuffled within.
 #[must_use]
-pub fn in_order(scene: &Scene, rows: Vec<(usize, Role, Vec<f64>)>) -> Vec<Planned> {
-    let mut from = vec![0.0; scene.arm.joint_count()];
-    let planned = rows.into_iter().enumerate().map(|(index, (pose_id, role, joints))| {
-        let from = std::mem::replace(&mut from, joints.clone());
-        let time_s = index as f64 * scene.plan.seconds_per_pose;
-        Planned { pose_id, role, joints, from, payload_kg: 0.0, time_s, dwell_s: scene.plan.dwell_s }
+pub fn plan(scene: &Scene, chosen: &[Vec<f64>], held_out: &[Vec<f64>]) -> Vec<Planned> {
+    let payloads = &scene.plan.payloads_kg;
+    let of = |role, configurations: &[Vec<f64>], first: usize| {
+        let row = |(index, joints): (usize, &Vec<f64>)| Row {
+            pose_id: first + index,
+            role,
+            joints: joints.clone(),
+            payload_kg: payloads[index % payloads.len()],
+        };
+        configurations.iter().enumerate().map(row).collect::<Vec<_>>()
+    };
+    let mut rows = Vec::with_capacity(scene.plan.repeats * (chosen.len() + held_out.len()));
+    for _ in 0..scene.plan.repeats {
+        rows.extend(of(Role::Fit, chosen, 0));
+        rows.extend(of(Role::HeldOut, held_out, chosen.len()));
+    }
+    stream(scene.seed, "plan/order").shuffle(&mut rows);
+    if scene.plan.payload_blocks {
+        let block = |row: &Row| payloads.iter().position(|payload| *payload == row.payload_kg);
+        rows.sort_by_key(block);
+    }
+    let times = (0..rows.len()).map(|index| index as f64 * scene.plan.seconds_per_pose).collect();
+    in_order(scene, rows, times)
+}
+
+/// The plan by which `measurements` were taken.
+#[must_use]
+pub fn as_measured(scene: &Scene, measurements: &[Measurement]) -> Vec<Planned> {
+    let row = |row: &Measurement| Row {
+        pose_id: row.pose_id,
+        role: row.role,
+        joints: row.joints.clone(),
+        payload_kg: row.payload_kg.unwrap_or_default(),
+    };
+    let times = measurements.iter().map(|row| row.time_s).collect();
+    in_order(scene, measurements.iter().map(row).collect(), times)
+}
+
+/// Rows in the order of measuring, with the moves between them.
+fn in_order(scene: &Scene, rows: Vec<Row>, times: Vec<f64>) -> Vec<Planned> {
+    let mut before = vec![0.0; scene.arm.joint_count()];
+    let planned = rows.into_iter().zip(times).map(|(Row { pose_id, role, joints, payload_kg }, time_s)| {
+        let before = std::mem::replace(&mut before, joints.clone());
+        let from = match directions(scene, pose_id) {
+            Some(directions) => start_of_move(scene, &joints, &directions),
+            None => before,
+        };
+        Planned { pose_id, role, joints, from, payload_kg, time_s, dwell_s: scene.plan.dwell_s }
     });
     planned.collect()
+}
+
+/// From which side each joint comes to configuration `pose_id`: whether upwards; `None` where it comes straight from the last one.
+fn directions(scene: &Scene, pose_id: usize) -> Option<Vec<bool>> {
+    let count = scene.arm.joint_count();
+    match scene.plan.approach.policy {
+        ApproachPolicy::Direct => None,
+        ApproachPolicy::Up => Some(vec![true; count]),
+        ApproachPolicy::Down => Some(vec![false; count]),
+        ApproachPolicy::Alternate => Some(vec![pose_id.is_multiple_of(2); count]),
+        ApproachPolicy::Random => {
+            // By the configuration, so that repeats are approached alike wherever they stand.
+            let mut coins = stream(scene.seed, &format!("plan/approach/{pose_id}"));
+            Some((0..count).map(|_| coins.unit() < 0.5).collect())
+        }
+    }
+}
+
+/// Where the last move begins; on the other side where a limit is in the way.
+fn start_of_move(scene: &Scene, joints: &[f64], upwards: &[bool]) -> Vec<f64> {
+    let approach = &scene.plan.approach;
+    let start = |((joint, upwards), of): ((&f64, &bool), &crate::kinematics::Joint)| {
+        let travel = if of.kind == JointKind::Revolute { approach.travel_rad } else { approach.travel_m };
+        let (below, above) = (joint - travel, joint + travel);
+        if (*upwards && below >= of.lower) || above > of.upper { below } else { above }
+    };
+    joints.iter().zip(upwards).zip(&scene.arm.chain.joints).map(start).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(settings: &[(&str, &str)]) -> Scene {
+        let mut file = crate::experiments::arms::arms().unwrap().swap_remove(0);
+        for (key, value) in settings {
+            file.set(key, value).unwrap();
+        }
+        file.scene
+    }
+
+    fn configurations(scene: &Scene, count: usize) -> Vec<Vec<f64>> {
+        let mut stream = stream(5, "test/plan");
+        let of = |stream: &mut crate::seed::Stream| {
+            scene.arm.chain.joints.iter().map(|of| stream.uniform(of.lower, of.upper)).collect()
+        };
+        (0..count).map(|_| of(&mut stream)).collect()
+    }
+
+    #[test]
+    fn without_settings_every_configuration_is_read_once_straight_from_the_last() {
+        let scene = scene(&[]);
+        let all = configurations(&scene, 10);
+        let planned = plan(&scene, &all[..6], &all[6..]);
+        let mut order: Vec<usize> = (0..10).collect();
+        stream(scene.seed, "plan/order").shuffle(&mut order);
+        assert_eq!(planned.iter().map(|row| row.pose_id).collect::<Vec<_>>(), order);
+        for (index, row) in planned.iter().enumerate() {
+            assert_eq!(row.joints, all[row.pose_id]);
+            assert_eq!(row.role, if row.pose_id < 6 { Role::Fit } else { Role::HeldOut });
+            assert_eq!((row.time_s, row.payload_kg), (index as f64 * scene.plan.seconds_per_pose, 0.0));
+            let before = index.checked_sub(1).map_or_else(|| vec![0.0; 8], |before| planned[before].joints.clone());
+            assert_eq!(row.from, before);
+        }
+    }
+
+    #[test]
+    fn repeats_share_number_payload_and_approach() {
+        for policy in ["up", "down", "alternate", "random"] {
+            let policy = format!("\"{policy}\"");
+            let scene = scene(&[
+                ("plan.repeats", "3"),
+                ("plan.approach", &policy),
+                ("plan.payloads_kg", "[0, 5]"),
+                ("plan.payload_blocks", "true"),
+            ]);
+            let all = configurations(&scene, 20);
+            let planned = plan(&scene, &all[..14], &all[14..]);
+            assert_eq!(planned.len(), 60);
+            assert!(planned.windows(2).all(|pair| pair[0].payload_kg <= pair[1].payload_kg));
+            for pose_id in 0..20 {
+                let repeats: Vec<&Planned> = planned.iter().filter(|row| row.pose_id == pose_id).collect();
+                assert_eq!(repeats.len(), 3);
+                for row in &repeats {
+                    assert_eq!(
+                        (&row.from, &row.joints, row.payload_kg),
+                        (&repeats[0].from, &all[pose_id], repeats[0].payload_kg)
+                    );
+                    for (joint, (from, to)) in row.from.iter().zip(&row.joints).enumerate() {
+                        let of = &scene.arm.chain.joints[joint];
+                        assert!((of.lower..=of.upper).contains(from));
+                        assert!(((from - to).abs() - 5f64.to_radians()).abs() < 1e-12);
+                        let upwards = match policy.as_str() {
+                            "\"up\"" => Some(true),
+                            "\"down\"" => Some(false),
+                            "\"alternate\"" => Some(pose_id % 2 == 0),
+                            _ => None,
+                        };
+                        let free = to - of.lower > 0.1 && of.upper - to > 0.1;
+                        assert!(!free || upwards.is_none_or(|upwards| (from < to) == upwards));
+                    }
+                }
+            }
+            let ups = planned.iter().flat_map(Planned::approach).filter(|direction| *direction > 0).count();
+            match policy.as_str() {
+                "\"up\"" => assert!(ups > 460),
+                "\"down\"" => assert!(ups < 20),
+                _ => assert!((140..340).contains(&ups), "{ups} of 480"),
+            }
+        }
+    }
+
+    #[test]
+    fn what_was_measured_tells_how_it_was_planned() {
+        let scene = scene(&[
+            ("plan.repeats", "2"),
+            ("plan.approach", "\"random\""),
+            ("plan.payloads_kg", "[0, 5]"),
+            ("plan.dwell_s", "2"),
+        ]);
+        let all = configurations(&scene, 12);
+        let planned = plan(&scene, &all[..8], &all[8..]);
+        let measured = planned.iter().enumerate().map(|(index, row)| Measurement {
+            index,
+            pose_id: row.pose_id,
+            role: row.role,
+            joints: row.joints.clone(),
+            payload_kg: Some(row.payload_kg),
+            time_s: row.time_s,
+            ..Measurement::default()
+        });
+        assert_eq!(as_measured(&scene, &measured.collect::<Vec<_>>()), planned);
+    }
 }

@@ -17,6 +17,7 @@ pub(super) struct SimulatedSensor<'a> {
     position: Stream,
     attitude: Stream,
     temperature: Stream,
+    ambient: Stream,
     outlier: Stream,
 }
 
@@ -29,6 +30,7 @@ impl<'a> SimulatedSensor<'a> {
             position: truth::stream(injected, public_seed, "noise/position"),
             attitude: truth::stream(injected, public_seed, "noise/attitude"),
             temperature: truth::stream(injected, public_seed, "noise/temperature"),
+            ambient: truth::stream(injected, public_seed, "noise/ambient"),
             outlier: truth::stream(injected, public_seed, "noise/outlier"),
         }
     }
@@ -64,6 +66,11 @@ impl<'a> SimulatedSensor<'a> {
         read.translation.vector += position * widened;
         read.rotation = rotation_from_vector(&(attitude * widened)) * read.rotation;
         (read, temperatures)
+    }
+
+    /// The temperature of the air as read, °C; `None` where there are no temperature sensors.
+    pub(super) fn read_ambient(&mut self, truth_c: f64) -> Option<f64> {
+        self.declared.temperature_sigma_k.map(|sigma_k| truth_c + sigma_k * self.ambient.normal())
     }
 
     /// How many times as wide as it should be the noise of the next reading is.

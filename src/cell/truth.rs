@@ -8,8 +8,8 @@ use crate::arm::Arm;
 use crate::effects::Level;
 use crate::kinematics::{JointKind, Quantity};
 use crate::physics::{Seat, SeatedBy, Settled, Yield};
+use crate::scene::Injected;
 use crate::scene::effect::Effect;
-use crate::scene::{Injected, ThermalProfile};
 use crate::seed::{Stream, hidden_key, hidden_stream};
 
 /// True parameters and the poses as they were before the sensor read them. Written to a file of its own, never to the recording.
@@ -248,41 +248,8 @@ pub fn parameters(arm: &Arm, injected: &Injected, public_seed: u64) -> Vec<TrueP
         .collect()
 }
 
-/// All that happens to the arm, its cell and its sensor.
-#[must_use]
-pub fn effects(injected: &Injected) -> Vec<Effect> {
-    let clearances = injected.clearances.iter().map(|clearance| Effect::Clearance {
-        joint: clearance.joint,
-        radial: clearance.radial_m,
-        axial: clearance.axial_m,
-        tilt: clearance.tilt_rad,
-    });
-    let expansion_per_k = injected.thermal.iter().flat_map(|thermal| thermal.expansion_per_k.iter());
-    let foot = expansion_per_k.clone().next().copied().unwrap_or_default();
-    let growth = expansion_per_k.enumerate().filter_map(|(link, expansion)| match link.checked_sub(1) {
-        None => Some(Effect::LinkThermalGrowth { link: None, expansion: *expansion }),
-        link if *expansion != foot => Some(Effect::LinkThermalGrowth { link, expansion: expansion - foot }),
-        _ => None,
-    });
-    clearances.chain(growth).chain(injected.effects.iter().cloned()).collect()
-}
-
 /// What `effects` are, where, and how large.
 #[must_use]
 pub fn described(arm: &Arm, effects: &[Effect]) -> Vec<TrueEffect> {
     effects.iter().map(|effect| TrueEffect::new(arm, effect)).collect()
-}
-
-/// Rise of every link (base first) over the reference temperature, K, at `share` (0 to 1) of the session.
-#[must_use]
-pub fn temperature_rise(arm: &Arm, injected: &Injected, share: f64) -> Vec<f64> {
-    let Some(thermal) = &injected.thermal else {
-        return vec![0.0; arm.links.len()];
-    };
-    let course = match thermal.profile {
-        ThermalProfile::Constant => 1.0,
-        ThermalProfile::WarmUp => share,
-        ThermalProfile::HeatAndCool => libm::sin(std::f64::consts::PI * share),
-    };
-    thermal.rise_k.iter().map(|rise| rise * course).collect()
 }

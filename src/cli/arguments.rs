@@ -27,7 +27,7 @@ pub(crate) struct Arguments {
 }
 
 /// Options of every command.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Options of every command")]
 pub(crate) struct Global {
     /// Print one JSON object on stdout; everything else goes to stderr
@@ -90,6 +90,10 @@ pub(crate) enum Command {
         Tables (CSV) and figures (SVG, PNG) go to OUT/reproduce/SCENE/."
     )]
     Reproduce(ReproduceOptions),
+    /// List the un-modelled effects that can be simulated, or check each against an independent solution
+    #[command(after_help = "Examples:\n  kincal effects                       what there is, where, in which unit and range\n  \
+        kincal effects scenes/arm8.toml      each on this arm against statics, 200 random configurations")]
+    Effects(EffectsOptions),
     /// What un-modelled effects do to a calibration: effect × place × magnitude × design × trials
     #[command(after_help = "Examples:\n  \
             kincal sweep scenes/arm8.toml --effect radial_clearance --at joint3 --magnitudes 0,10,30,60um\n  \
@@ -107,6 +111,92 @@ pub(crate) enum Command {
             Results go to OUT/NAME-sweep.jsonl as trials finish; the same command goes on behind them. From them come .mcap, .csv,\n\
             -combinations.csv, .svg and .png.")]
     Sweep(SweepOptions),
+    /// Blind cases whose fault is withheld, and the score of whoever diagnoses them
+    Challenge {
+        /// What to do
+        #[command(subcommand)]
+        command: ChallengeCommand,
+    },
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum ChallengeCommand {
+    /// Make blind cases: recordings, the sealed truth, and a commitment to it
+    #[command(after_help = "Examples:\n  \
+        kincal challenge new --cases 500 --seed \"$(od -An -N8 -tu8 /dev/urandom | tr -d ' ')\" --out blind\n  \
+        kincal challenge new --cases 100 --seed 7391284650193847 --kinds backlash,gravity_lost_motion --effects 1 --out blind\n  \
+        kincal challenge new --cases 1000 --seed 7391284650193847 --effects 0 --heavy-tails 0.33 --understated 0.33 --out quiet\n\n\
+        Every case is a cell with an arm of its own: random configurations and approach, heating and cooling, two payloads, some\n\
+        configurations read twice. What is written of it is what a real cell would tell. The truth, with the detectability of every\n\
+        effect, is in OUT/sealed.truth; its SHA-256 is printed and stands in OUT/commitment.txt. The same command makes the same bytes.")]
+    New(NewOptions),
+    /// Diagnose the cases, then open the seal, check the commitment and print the score
+    #[command(after_help = "Examples:\n  \
+        kincal challenge score blind --baseline none\n  \
+        kincal challenge score blind --verdicts mine        verdicts of another tool: mine/case-0001.json …\n\n\
+        A verdict is what `kincal diagnose --json` prints; needed of it: verdict, effects [{kind, location {level, index}, probability,\n\
+        magnitude {value, unit, ci95}}], confusion_sets, unknown {present}.")]
+    Score(ScoreOptions),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct NewOptions {
+    /// Number of cases
+    #[arg(long, value_name = "N")]
+    pub(crate) cases: usize,
+    /// Effects to draw from: kinds, `known` (the default), `foreign` (those outside the analyser's library) or `all`
+    #[arg(long, value_name = "KIND", value_delimiter = ',')]
+    pub(crate) kinds: Vec<String>,
+    /// Number of effects of a case: a number, or fewest..most (both included)
+    #[arg(long, value_name = "N|A..B", default_value = "0..3", allow_hyphen_values = true)]
+    pub(crate) effects: String,
+    /// Share of cases without an effect; without it every number of effects is as likely
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    pub(crate) base_rate: Option<f64>,
+    /// Declared position noises to draw from, one sigma per axis in µm
+    #[arg(long, value_name = "UM", value_delimiter = ',', default_value = "20,50", allow_negative_numbers = true)]
+    pub(crate) noise: Vec<f64>,
+    /// Share of cases whose noise has heavy tails
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub(crate) heavy_tails: f64,
+    /// Share of cases whose noise is 1.3 times what is declared
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub(crate) understated: f64,
+    /// Readings of a case
+    #[arg(long, value_name = "M", default_value_t = 60)]
+    pub(crate) poses: usize,
+    /// Of them, second readings of a configuration [default: a sixth]
+    #[arg(long, value_name = "N")]
+    pub(crate) repeats: Option<usize>,
+    /// Kinds that whoever diagnoses must not use; they are drawn, and are to be called unknown
+    #[arg(long, value_name = "KIND", value_delimiter = ',')]
+    pub(crate) withheld: Vec<String>,
+    /// Scene with the arm and the cell, in place of the eight-joint arm; what it injects is left out
+    #[arg(long, value_name = "SCENE")]
+    pub(crate) scene: Option<PathBuf>,
+    /// Override a value of the scene; may be given again
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ScoreOptions {
+    /// Folder of the challenge
+    #[arg(value_name = "DIR")]
+    pub(crate) folder: PathBuf,
+    /// Verdicts made elsewhere: a folder with case-0001.json …
+    #[arg(long, value_name = "DIR")]
+    pub(crate) verdicts: Option<PathBuf>,
+    /// Diagnosis that needs no thought, to be scored in place of kincal's
+    #[arg(long, value_enum, conflicts_with = "verdicts")]
+    pub(crate) baseline: Option<Baseline>,
+}
+
+/// Trivial diagnoses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Baseline {
+    /// Nothing is ever wrong
+    None,
 }
 
 #[derive(Debug, Args)]
@@ -116,6 +206,15 @@ pub(crate) struct SceneOptions {
     /// Override a value of the scene, such as `design.count=20`; may be given again
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(crate) set: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EffectsOptions {
+    /// Scene file (TOML) whose nominal arm the effects happen to; without it they are listed
+    pub(crate) scene: Option<PathBuf>,
+    /// Random configurations per effect
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u16).range(2..=10_000))]
+    pub(crate) poses: u16,
 }
 
 #[derive(Debug, Args)]
@@ -251,7 +350,7 @@ pub(crate) struct SweepOptions {
     #[arg(long, value_name = "COURSE", value_delimiter = ',')]
     pub(crate) temperature: Vec<String>,
     /// Masses in kg that take turns on the tool, such as 0,5; give it again for another set
-    #[arg(long, value_name = "KG,…")]
+    #[arg(long, value_name = "KG,…", allow_hyphen_values = true)]
     pub(crate) payloads: Vec<String>,
     /// Readings of each configuration
     #[arg(long, value_name = "N", value_delimiter = ',')]

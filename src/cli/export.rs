@@ -67,7 +67,7 @@ fn from_recording(global: &Global, options: &ExportOptions) -> anyhow::Result<(&
             if measured.is_empty() {
                 bail!("{} holds no measurements", path.display());
             }
-            Ok(("csv", table::write(&measured)))
+            Ok(("csv", table::write(&measured)?))
         }
         Format::Urdf => {
             let identified = recording.events.iter().rev().find_map(|event| match event {

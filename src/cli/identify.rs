@@ -44,8 +44,8 @@ fn from_table(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outc
     let robot = input::robot_of_table(&options.input, &options.robot)?;
     let (start, real) = input::described("identify", robot, &options.robot)?;
     let table = table::read(&options.input)?;
-    if !table.unused_columns.is_empty() {
-        output::note(global, &format!("note: an identification does not use {}", table.unused_columns.join(", ")));
+    if !table.conditions.is_empty() {
+        output::note(global, &format!("note: an identification does not use {}", table.conditions.join(", ")));
     }
     let (nominal, _) = session::real_robot(&start, &real).with_context(|| robot.display().to_string())?;
     input::check_units(&options.input, &table, &nominal)?;

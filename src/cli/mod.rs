@@ -3,8 +3,10 @@
 //! Exit codes: 0 done; 1 done, but the answer is bad (a fit that did not converge, a replay that differs); 2 the input is wrong.
 
 mod arguments;
+mod challenge;
 mod design;
 mod diagnose;
+mod effects;
 mod export;
 mod identify;
 mod input;
@@ -73,7 +75,7 @@ fn dispatch(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if let (Some(seed), Command::Diagnose(_) | Command::Identify(_) | Command::Replay(_) | Command::Export(_)) = (global.seed, &arguments.command) {
         ensure!(
             false,
-            "--seed {seed}: this command draws nothing; leave it out, or give it to run, design, measure, reproduce or sweep"
+            "--seed {seed}: this command draws nothing; leave it out, or give it to run, design, measure, reproduce, sweep or challenge new"
         );
     }
     output::check_rerun(global)?;
@@ -85,7 +87,9 @@ fn dispatch(arguments: &Arguments) -> anyhow::Result<Outcome> {
         Command::Identify(options) => identify::command(global, options),
         Command::Replay(options) => replay::command(global, options),
         Command::Export(options) => export::command(global, options),
+        Command::Effects(options) => effects::command(global, options),
         Command::Reproduce(options) => reproduce::command(global, options),
         Command::Sweep(options) => sweep::command(global, options),
+        Command::Challenge { command } => challenge::command(global, command),
     }
 }

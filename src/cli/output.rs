@@ -20,14 +20,7 @@ use crate::scene::{Criterion, DesignProblem, Injected, SceneFile};
 pub(crate) fn scene(global: &Global, options: &SceneOptions) -> anyhow::Result<SceneFile> {
     let mut file = crate::scene::read(&options.scene)?;
     for assignment in &options.set {
-        let Some((key, value)) = assignment.split_once('=') else {
-            bail!("--set {assignment}: KEY=VALUE is needed, such as design.count=20");
-        };
-        let value = value.trim();
-        // A shell takes the quotes away: what is no TOML value is a text.
-        let is_toml = toml::from_str::<toml::Table>(&format!("value = {value}")).is_ok();
-        let text = if is_toml { value.to_owned() } else { toml::Value::String(value.to_owned()).to_string() };
-        file.set(key.trim(), &text)?;
+        assign(&mut file, assignment)?;
     }
     if let Some(seed) = global.seed {
         file.set_seed(seed)?;
@@ -37,6 +30,18 @@ pub(crate) fn scene(global: &Global, options: &SceneOptions) -> anyhow::Result<S
         note(global, &format!("note: {text}"));
     }
     Ok(file)
+}
+
+/// Applies an override `KEY=VALUE` of the command line.
+pub(crate) fn assign(file: &mut SceneFile, assignment: &str) -> anyhow::Result<()> {
+    let Some((key, value)) = assignment.split_once('=') else {
+        bail!("--set {assignment}: KEY=VALUE is needed, such as design.count=20");
+    };
+    let value = value.trim();
+    // A shell takes the quotes away: what is no TOML value is a text.
+    let is_toml = toml::from_str::<toml::Table>(&format!("value = {value}")).is_ok();
+    let text = if is_toml { value.to_owned() } else { toml::Value::String(value.to_owned()).to_string() };
+    Ok(file.set(key.trim(), &text)?)
 }
 
 /// The hidden part that only a simulated measurement needs.

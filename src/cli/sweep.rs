@@ -14,7 +14,7 @@ use super::reproduce::Progress;
 use crate::arm::Arm;
 use crate::cell;
 use crate::effects::Level;
-use crate::experiments::injection::{Sort, magnitudes};
+use crate::experiments::injection::{Sort, magnitudes, written};
 use crate::experiments::sweep::grid::{COURSES, Injecting, SCENES_COURSE};
 use crate::experiments::sweep::results::{Reader, merge};
 use crate::experiments::sweep::{Background, CellSummary, Grid, Header, Reduction, Results, Sweep};
@@ -23,6 +23,8 @@ use crate::recording::truth_file::write_whole;
 use crate::report;
 use crate::scene::{Method, Scene};
 
+/// A magnitude so many times the largest realistic one is a mistake in its unit.
+const ABSURD: f64 = 100.0;
 /// Trials in every cell if nobody asks for another number.
 const TRIALS: u64 = 100;
 
@@ -256,7 +258,7 @@ impl Axes {
             temperatures: named("temperature", &self.temperature, SCENES_COURSE.to_owned(), &COURSES)?,
             payloads_kg: if self.payloads_kg.is_empty() { vec![plan.payloads_kg.clone()] } else { self.payloads_kg.clone() },
             repeats,
-            background: if self.keep_injected || self.effect.is_empty() { Background::Scene } else { Background::Nothing },
+            background: if self.keep_injected { Background::Scene } else { Background::Nothing },
         })
     }
 
@@ -266,7 +268,7 @@ impl Axes {
                 self.at.is_empty() && self.magnitudes.is_none(),
                 "at and magnitudes say where and how much of which effect? Name it: --effect radial_clearance"
             );
-            return Ok(vec![Injecting::as_the_scene()]);
+            return Ok(vec![Injecting::nothing(), Injecting::as_the_scene()]);
         }
         let mut effects: Vec<Injecting> = Vec::new();
         for name in &self.effect {
@@ -277,13 +279,21 @@ impl Axes {
                 )
             })?;
             let places = places(sort, &self.at, arm)?;
+            let [low, high] = sort.range(places[0], arm);
             let values = match &self.magnitudes {
                 Some(text) => magnitudes(text, sort).map_err(|why| anyhow::anyhow!("magnitudes {text}: {why}"))?,
-                None => {
-                    let [low, high] = sort.range(places[0], arm);
-                    vec![0.0, low, (low * high).sqrt(), high]
-                }
+                None => vec![0.0, low, (low * high).sqrt(), high],
             };
+            for value in &values {
+                ensure!(
+                    *value <= ABSURD * high,
+                    "magnitudes: {} of {name} is no fault but another machine; realistic are {} to {}, and up to {ABSURD} times that is \
+                     taken",
+                    written(*value, sort),
+                    written(low, sort),
+                    written(high, sort)
+                );
+            }
             for injecting in Injecting::all(sort, &places, &values) {
                 if !effects.contains(&injecting) {
                     effects.push(injecting);

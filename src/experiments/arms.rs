@@ -14,6 +14,14 @@ const SCENES: [(&str, &str); 3] = [
 /// What one of them takes from another file.
 const URDF: (&str, &str) = ("urdf_file = \"panda.urdf\"", include_str!("../../scenes/panda.urdf"));
 
+/// The scene of the eight-joint arm on a floor that a tracker measures.
+///
+/// # Errors
+/// If it is no valid scene.
+pub fn arm8() -> Result<SceneFile, SceneError> {
+    scene::parse(include_str!("../../scenes/arm8.toml"), "scenes/arm8.toml")
+}
+
 /// The scenes of all arms.
 ///
 /// # Errors

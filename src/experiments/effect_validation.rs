@@ -38,6 +38,8 @@ pub const MARK_POSES_PER_S: f64 = 2000.0;
 /// What every pose of the validation carries, kg.
 const PAYLOAD_KG: f64 = 5.0;
 const SECONDS_PER_POSE: f64 = 20.0;
+/// How long the speed is measured, s.
+const CLOCK_S: f64 = if cfg!(test) { 0.01 } else { 0.2 };
 const DWELL_S: f64 = 2.0;
 
 /// A set of effects to be validated, with its name.
@@ -60,7 +62,7 @@ pub struct Line {
     pub magnitude: String,
     /// Poses that were compared.
     pub poses: usize,
-    /// Poses left out because no load decides where a play rests in them.
+    /// Poses in which no load decides where some play rests: friction holds it in the middle, and the independent solution is told so.
     pub undecided: usize,
     /// Displacement of the tool by the effect, root mean square, m.
     pub displacement_rms_m: f64,
@@ -106,7 +108,7 @@ pub fn cases(arm: &Arm) -> Vec<Case> {
     let (compliance, backlash, play) = (
         Effect::JointCompliance { joint: j2, stiffness: 3e4 },
         Effect::Backlash { joint: j2, width: 60.0 * ARCSEC },
-        clearance(j2, 30e-6, 0.0, 100e-6),
+        clearance(j2, 30e-6, 10e-6, 100e-6),
     );
     let joint = |joint: usize, text: &str| format!("{text}, joint {}", joint + 1);
     let link = |link: usize, text: &str| format!("{text}, link {}", link + 1);
@@ -270,20 +272,17 @@ fn of_arm(arm: &Arm, case: &Case, planned: &[Planned]) -> Result<Line, Validatio
     for (index, row) in planned.iter().enumerate() {
         let settled = physical.settle(&conditions(index));
         all.settled(&settled);
-        if undecided(&settled) {
-            all.undecided += 1;
-            continue;
-        }
+        all.undecided += usize::from(undecided(&settled));
         let without = still.settle(&conditions(index));
         let memory: Vec<f64> = memories.iter().map(|memory| memory[index]).collect();
-        let told = Row { planned: row, share: share(row), rise_k: &rise_k[index], memory: &memory };
+        let told = Row { planned: row, share: share(row), rise_k: &rise_k[index], memory: &memory, settled: &settled };
         let (first, converged) = statics.displacement(&case.effects, &told);
         let simulated = settled.base_from_tool.translation.vector - without.base_from_tool.translation.vector;
         all.add(&simulated, &first, &converged);
     }
     // As often as it takes for the clock to be worth reading.
     let (start, mut settled) = (Instant::now(), 0);
-    while start.elapsed().as_secs_f64() < 0.1 {
+    while start.elapsed().as_secs_f64() < CLOCK_S {
         for index in 0..planned.len() {
             physical.settle(&conditions(index));
             settled += 1;
@@ -305,8 +304,6 @@ fn of_sensor(scene: &Scene, case: &Case, planned: &[Planned]) -> Result<Line, Va
         length_error_m: 0.0,
         angle_error_rad: 0.0,
         parameter_errors: Vec::new(),
-        clearances: Vec::new(),
-        thermal: None,
         effects,
         noise: if outliers { Noise::Declared { factor: 1.0 } } else { Noise::Off },
     };
@@ -423,6 +420,18 @@ struct Row<'a> {
     rise_k: &'a [f64],
     /// What each effect with a memory has left at this row, rad or m.
     memory: &'a [f64],
+    /// What the simulation says, of which only what friction holds is used.
+    settled: &'a Settled,
+}
+
+impl Row<'_> {
+    /// 1 where a load decides the plays of `joint`: across, along, tilt, and about the axis; 0 where friction holds them.
+    fn decided(&self, joint: usize) -> [f64; 4] {
+        let seat = &self.settled.seats[joint];
+        let lost = self.settled.yields.iter().find(|of| of.joint == joint && of.effect == "gravity_lost_motion");
+        let by = [seat.radial_by, seat.axial_by, seat.tilt_by, lost.map_or(SeatedBy::Fit, |lost| lost.by)];
+        by.map(|by| if by == SeatedBy::Friction { 0.0 } else { 1.0 })
+    }
 }
 
 /// The nominal arm as rigid bodies.
@@ -603,7 +612,9 @@ impl<'a> Statics<'a> {
                     let direction = f64::from(row.planned.approach()[joint]);
                     turn(joint, -0.5 * width * direction);
                 }
-                Effect::GravityLostMotion { joint, width } => turn(joint, 0.5 * width * torque(joint).signum()),
+                Effect::GravityLostMotion { joint, width } => {
+                    turn(joint, 0.5 * width * torque(joint).signum() * row.decided(joint)[3]);
+                }
                 Effect::JointEccentricity { joint, amplitude, order, phase } => {
                     turn(joint, amplitude * libm::cos(f64::from(order) * q[joint] + phase));
                 }
@@ -640,11 +651,10 @@ impl<'a> Statics<'a> {
                 Effect::Clearance { joint, radial, axial, tilt } => {
                     let Wrench { force, moment } = wrenches[joint];
                     let twist = &mut motions.joints[joint];
-                    twist.translation += unit(across(force)) * radial;
-                    if axial > 0.0 {
-                        twist.translation.z += axial * force.z.signum();
-                    }
-                    twist.rotation += unit(across(moment)) * tilt;
+                    let [by_radial, by_axial, by_tilt, _] = row.decided(joint);
+                    twist.translation += unit(across(force)) * (radial * by_radial);
+                    twist.translation.z += axial * force.z.signum() * by_axial;
+                    twist.rotation += unit(across(moment)) * (tilt * by_tilt);
                 }
                 Effect::BaseDrift { translation, rotation, .. } => {
                     motions.base.translation += translation * row.share;
@@ -773,8 +783,64 @@ mod tests {
                 line.first_order_misses_m * 1e6,
                 line.undecided
             );
-            assert!(line.poses > 20 && line.displacement_rms_m > 3e-6, "{line:?}");
+            assert!(line.poses == planned.len() && line.displacement_rms_m > 3e-6, "{line:?}");
             assert!(line.largest_over_mark <= 1.0 && line.settling_error_m < MARK_SETTLING_M && line.unsettled == 0, "{line:?}");
+        }
+    }
+
+    /// An effect of the arm, anywhere, with a magnitude from its realistic range.
+    fn any(arm: &Arm, stream: &mut crate::seed::Stream) -> Effect {
+        let count = arm.joint_count();
+        let (joint, source) = (stream.index(count), stream.index(count));
+        let turns = arm.chain.joints[joint].kind == JointKind::Revolute;
+        let mut within = |low: f64, high: f64| low * (high / low).powf(stream.unit());
+        let width = within(20.0, 120.0) * ARCSEC;
+        let amplitude = within(10.0, 100.0) * ARCSEC;
+        let (share, small) = (within(0.1, 0.9), within(10e-6, 60e-6));
+        let shift = Vector3::new(within(15e-6, 80e-6), -small, small);
+        // Metres where the joint slides: stiffness per millimetre, play in tens of micrometres.
+        let (stiffness, width) = if turns { (within(2e3, 6e4), width) } else { (within(5e6, 5e7), small) };
+        match stream.index(if turns { 18 } else { 12 }) {
+            0 => Effect::JointCompliance { joint, stiffness },
+            1 => Effect::LinkBending { link: joint, compliance: 0.2 / stiffness.clamp(4e3, 4e4) },
+            2 => Effect::Backlash { joint, width },
+            3 => Effect::GravityLostMotion { joint, width },
+            4 => Effect::GearCoupling { joint, ratio_error: 2e-4, coupling: -1e-4, source },
+            5 => Effect::LinkThermalGrowth { link: Some(joint), expansion: 2e-5 },
+            6 => Effect::LinkThermalGrowth { link: None, expansion: 1.2e-5 },
+            7 => Effect::Clearance { joint, radial: small, axial: small / 2.0, tilt: 3.0 * small },
+            8 => Effect::BaseDrift { moves: Moves::Base, translation: shift, rotation: shift },
+            9 => Effect::BaseStep { moves: Moves::Base, translation: shift, rotation: -shift, after: share },
+            10 => Effect::ToolStep { translation: shift * 5.0, rotation: shift, after: share },
+            11 => Effect::WrongPayload { excess: 1.5, stiffness: 2e4 },
+            12 => Effect::JointEccentricity { joint, amplitude, order: 1, phase: share * 6.0 },
+            13 => Effect::JointEccentricity { joint, amplitude, order: 2, phase: -share * 6.0 },
+            14 => Effect::StrainWaveError { joint, amplitude: amplitude / 3.0, ratio: 120.0, phase: share },
+            15 => Effect::MomentCrosstalk { joint, gain: small / 20.0 },
+            16 => Effect::MemoryHysteresis { joint, amplitude, travel: share },
+            _ => Effect::CreepAfterMotion { joint, compliance: 0.2 / stiffness, time_constant: share * 200.0 },
+        }
+    }
+
+    /// Up to four effects at once, in the same joint or not, on arms that are not alike.
+    #[test]
+    fn any_effects_together_do_what_statics_says() {
+        for name in ["arm8", "panda", "paper", "parallel8"] {
+            let scene = crate::scene::read(std::path::Path::new(&format!("scenes/{name}.toml"))).unwrap().scene;
+            let mut stream = stream(11, &format!("test/effects/together/{name}"));
+            let (mut worst, mut settling, mut sets): (f64, f64, usize) = (0.0, 0.0, 0);
+            for index in 0..40 {
+                let planned = session(&scene.arm, 12, index);
+                let effects: Vec<Effect> = (0..1 + stream.index(4)).map(|_| any(&scene.arm, &mut stream)).collect();
+                let case = Case { name: "together".to_owned(), effects, magnitude: String::new() };
+                let line = validate(&scene, &case, &planned).unwrap();
+                assert!(line.unsettled == 0 && line.settling_error_m < MARK_SETTLING_M, "{name} {case:?} {line:?}");
+                assert!(line.largest_over_mark <= 1.0, "{name} {case:?} {line:?}");
+                worst = worst.max(line.largest_over_mark);
+                settling = settling.max(line.settling_error_m);
+                sets += 1;
+            }
+            println!("{name}: {sets} sets, at most {worst:.3} of the mark, settling error {settling:.1e} m");
         }
     }
 }

@@ -264,26 +264,27 @@ pub fn magnitude(effect: &Effect, kind: Option<Kind>) -> f64 {
     }
 }
 
-/// Units in which magnitudes are written, with their factor to SI, by the unit in SI; the first is used where results are printed.
+/// Units in which magnitudes of `sort` are written, with their factor to SI; the first is used where results are printed.
 #[must_use]
-pub fn units(si: &str) -> &'static [(&'static str, f64)] {
-    match si {
-        "m" => &[("um", 1e-6), ("µm", 1e-6), ("mm", 1e-3), ("m", 1.0)],
+pub fn units(sort: Sort) -> &'static [(&'static str, f64)] {
+    match sort.unit() {
+        "m" => &[("µm", 1e-6), ("um", 1e-6), ("mm", 1e-3), ("m", 1.0)],
         "rad" => &[
-            ("urad", 1e-6),
             ("µrad", 1e-6),
+            ("urad", 1e-6),
             ("mrad", 1e-3),
             ("rad", 1.0),
             ("arcsec", ARCSEC),
             ("arcmin", 60.0 * ARCSEC),
             ("deg", PI / 180.0),
         ],
-        "rad/(N·m)" => &[("urad/Nm", 1e-6), ("µrad/Nm", 1e-6), ("rad/Nm", 1.0), ("rad/(N·m)", 1.0)],
-        "rad/rad" => &[("urad/rad", 1e-6), ("ppm", 1e-6), ("rad/rad", 1.0)],
-        "1/K" => &[("um/m/K", 1e-6), ("ppm/K", 1e-6), ("1/K", 1.0)],
-        "rad/K" => &[("urad/K", 1e-6), ("µrad/K", 1e-6), ("rad/K", 1.0), ("arcsec/K", ARCSEC)],
+        "rad/(N·m)" => &[("µrad/Nm", 1e-6), ("urad/Nm", 1e-6), ("rad/Nm", 1.0), ("rad/(N·m)", 1.0)],
+        "rad/rad" => &[("µrad/rad", 1e-6), ("urad/rad", 1e-6), ("ppm", 1e-6), ("rad/rad", 1.0)],
+        "1/K" => &[("µm/m/K", 1e-6), ("um/m/K", 1e-6), ("ppm/K", 1e-6), ("1/K", 1.0)],
+        "rad/K" => &[("µrad/K", 1e-6), ("urad/K", 1e-6), ("rad/K", 1.0), ("arcsec/K", ARCSEC)],
         "kg" => &[("kg", 1.0), ("g", 1e-3)],
-        _ => &[("ppm", 1e-6), ("%", 1e-2), ("1", 1.0)],
+        _ if sort == Sort::Known(Kind::MeasurementOutliers) => &[("%", 1e-2), ("1", 1.0)],
+        _ => &[("ppm", 1e-6), ("1", 1.0)],
     }
 }
 
@@ -292,7 +293,7 @@ pub fn units(si: &str) -> &'static [(&'static str, f64)] {
 /// # Errors
 /// In words, if a number or a unit is none.
 pub fn magnitudes(text: &str, sort: Sort) -> Result<Vec<f64>, String> {
-    let known = units(sort.unit());
+    let known = units(sort);
     let names = || known.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
     let mut unit: Option<f64> = None;
     let mut values = Vec::new();
@@ -317,16 +318,22 @@ pub fn magnitudes(text: &str, sort: Sort) -> Result<Vec<f64>, String> {
             None if number == 0.0 => 1.0,
             None => return Err(format!("the unit of `{part}` is missing; units of {}: {}", sort.name(), names())),
         };
-        values.push(number * factor);
+        values.push(in_si(number, factor));
     }
     values.reverse();
     Ok(values)
 }
 
+/// `number` times `factor`, rounded once where the factor is one over a whole number: 10 µm are 1e-5 m to the last bit.
+fn in_si(number: f64, factor: f64) -> f64 {
+    let inverse = (1.0 / factor).round();
+    if (inverse * factor - 1.0).abs() < 1e-12 { number / inverse } else { number * factor }
+}
+
 /// A magnitude in the unit in which results are printed.
 #[must_use]
 pub fn written(value: f64, sort: Sort) -> String {
-    let (unit, factor) = units(sort.unit())[0];
+    let (unit, factor) = units(sort)[0];
     format!("{} {unit}", crate::report::number(value / factor))
 }
 

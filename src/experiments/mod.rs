@@ -6,6 +6,7 @@ pub mod advice;
 pub mod arms;
 pub mod bake_off;
 pub mod bench;
+pub mod challenge;
 pub mod conditions;
 pub mod count_error;
 pub mod count_index;

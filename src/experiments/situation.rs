@@ -8,7 +8,8 @@ use serde::Serialize;
 
 use super::arms::cut;
 use crate::measurement::{Sensor, View};
-use crate::scene::{Injected, JointClearance, Noise, Scene, Thermal, ThermalProfile, Weights};
+use crate::scene::effect::Effect;
+use crate::scene::{Injected, Noise, Scene, Temperature, ThermalProfile, Weights};
 
 /// Half of what a joint may turn about the middle of its range where joints are limited, rad.
 const LIMITED_RAD: f64 = std::f64::consts::FRAC_PI_3;
@@ -73,6 +74,7 @@ impl Situation {
         scene.design.count = self.count;
         scene.plan.held_out_count = 30;
         scene.plan.held_out_exact = true;
+        scene.plan.temperature = self.effects.then(|| warmth(scene.arm.joint_count()));
         scene
     }
 
@@ -80,27 +82,17 @@ impl Situation {
     #[must_use]
     pub fn injected(self, base: &Scene) -> Injected {
         let joints = base.arm.joint_count();
-        let clearance = |joint| JointClearance { joint, radial_m: 30e-6, axial_m: 10e-6, tilt_rad: 100e-6 };
-        let thermal = Thermal {
-            expansion_per_k: (0..=joints).map(|link| if link == 0 { 12e-6 } else { 23e-6 }).collect(),
-            // Most where the large motors are, least at the base and the tool.
-            rise_k: (0..=joints)
-                .map(|link| 3.0 + 7.0 * libm::sin(std::f64::consts::PI * link as f64 / (joints + 1) as f64))
-                .collect(),
-            profile: ThermalProfile::HeatAndCool,
-        };
+        let clearance = |joint| Effect::Clearance { joint, radial: 30e-6, axial: 10e-6, tilt: 100e-6 };
+        // The foot is of steel, the links of aluminium.
+        let foot = Effect::LinkThermalGrowth { link: None, expansion: 12e-6 };
+        let links = (0..joints).map(|link| Effect::LinkThermalGrowth { link: Some(link), expansion: 11e-6 });
+        let play = [1, 3].into_iter().filter(|joint| *joint < joints).map(clearance);
         Injected {
             seed: "0f4d1c6be28a73955b1e90d7c3a64f82".to_owned(),
             length_error_m: 1e-3,
             angle_error_rad: 0.2 * std::f64::consts::PI / 180.0,
             parameter_errors: Vec::new(),
-            clearances: if self.effects {
-                [1, 3].into_iter().filter(|joint| *joint < joints).map(clearance).collect()
-            } else {
-                Vec::new()
-            },
-            thermal: self.effects.then_some(thermal),
-            effects: Vec::new(),
+            effects: if self.effects { play.chain([foot]).chain(links).collect() } else { Vec::new() },
             noise: Noise::Declared { factor: 1.0 },
         }
     }
@@ -118,5 +110,16 @@ impl Situation {
             Reach::Cone => "cone ±12°",
         };
         format!("{sees}, {reach}, effects {}", if self.effects { "on" } else { "off" })
+    }
+}
+
+/// Links that warm and cool: most where the large motors are, least at the base and the tool.
+fn warmth(joints: usize) -> Temperature {
+    let along = |link: usize| link as f64 / (joints + 1) as f64;
+    Temperature {
+        profile: ThermalProfile::HeatAndCool,
+        rise_k: (0..=joints).map(|link| 3.0 + 7.0 * libm::sin(std::f64::consts::PI * along(link))).collect(),
+        lag_s: vec![0.0; joints + 1],
+        ambient_rise_k: 0.0,
     }
 }

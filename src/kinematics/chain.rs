@@ -1,6 +1,6 @@
 //! A serial chain of elementary motions.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3, Vector6};
 
 use super::parameters::{Parameter, Quantity};
 use crate::frames::{Pose, pose_from_parts};
@@ -374,6 +374,27 @@ impl ChainAt {
         segments
     }
 
+    /// How the tool moves per unit of each joint coordinate, base to tool: its origin's velocity (m) and its turn (rad), both in
+    /// base axes, per rad or m.
+    #[must_use]
+    pub fn joint_jacobian(&self, joints: &[f64]) -> Vec<Vector6<f64>> {
+        debug_assert_eq!(joints.len(), self.joint_count);
+        let mut walker = Walker::at_base();
+        let mut axes = Vec::with_capacity(self.joint_count);
+        for step in &self.steps {
+            if let Prepared::Turn { .. } | Prepared::Slide { .. } = step {
+                axes.push((matches!(step, Prepared::Turn { .. }), walker.axes[Axis::Z.index()], walker.origin));
+            }
+            walker.step(step, joints);
+        }
+        let tool = walker.origin;
+        let column = |(turns, axis, origin): (bool, Vector3<f64>, Vector3<f64>)| {
+            let (linear, angular) = if turns { (axis.cross(&(tool - origin)), axis) } else { (axis, Vector3::zeros()) };
+            Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
+        };
+        axes.into_iter().map(column).collect()
+    }
+
     /// Forward kinematics and the error Jacobian (eq. 52, in base axes): how the tool's position (m, rows 0–2) and attitude
     /// (rotation vector, rad, rows 3–5) change per unit of each parameter. Both parts are expressed in base; eq. 52 expresses
     /// them in the tool's axes, which changes no singular value.
@@ -433,5 +454,34 @@ fn put(rows: &mut [f64], stride: usize, column: usize, linear: &Vector3<f64>, an
     for axis in 0..3 {
         rows[axis * stride + column] = linear[axis];
         rows[(3 + axis) * stride + column] = angular[axis];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::frames::pose_error;
+    use crate::seed::stream;
+
+    #[test]
+    fn the_joint_jacobian_is_how_the_pose_changes_with_the_joints() {
+        let mut stream = stream(1, "test/chain/joint_jacobian");
+        for file in crate::experiments::arms::arms().unwrap() {
+            let arm = file.scene.arm;
+            let chain = arm.chain.at_nominal();
+            for _ in 0..20 {
+                let joints: Vec<f64> = arm.chain.joints.iter().map(|of| stream.uniform(of.lower, of.upper)).collect();
+                for (joint, column) in chain.joint_jacobian(&joints).iter().enumerate() {
+                    let moved = |by: f64| {
+                        let mut moved = joints.clone();
+                        moved[joint] += by;
+                        chain.forward(&moved)
+                    };
+                    // Central differences: off by h² of the third derivative, and by rounding over h.
+                    let step = 1e-5;
+                    let difference = pose_error(&moved(step), &moved(-step)) / (2.0 * step);
+                    assert!((difference - column).amax() < 1e-9, "joint {joint}: {difference} and {column}");
+                }
+            }
+        }
     }
 }

@@ -2,10 +2,9 @@
 //!
 //! A header names the columns and their units; `#` starts a comment line; columns stand in any order; an unknown column is an error.
 //! `pose_id`, `time_s`, `q1_rad`…`qN_rad` (or `_deg`; `_m`, `_mm` for prismatic joints), `x_m, y_m, z_m` (or `_mm`), optional
-//! `qx, qy, qz, qw`, `role` (`fit`, `held_out`), `temp_ambient_c`, `temp1_c`…, and the columns that only the diagnosis uses:
-//! `target`, `approach1`…, `payload_kg`, `dwell_s`, `session`.
+//! `qx, qy, qz, qw`, `role` (`fit`, `held_out`), and the conditions: `approach1`… (-1, 0, 1), `temp_ambient_c`, `temp1_c`…, `payload_kg`,
+//! `dwell_s`, `session`, `target`.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use super::{Measurement, Role};
@@ -17,8 +16,8 @@ pub struct Table {
     pub measurements: Vec<Measurement>,
     /// Of each joint column, whether its unit is a length.
     pub joint_is_length: Vec<bool>,
-    /// Columns that were read but that an identification does not use.
-    pub unused_columns: Vec<String>,
+    /// Columns of conditions: an identification does not use them, a diagnosis does.
+    pub conditions: Vec<String>,
 }
 
 /// A table that cannot be used.
@@ -56,22 +55,12 @@ enum Column {
     Quaternion { component: usize },
     Role,
     Temperature { sensor: usize },
+    Approach { joint: usize },
     Ambient,
     Payload,
     Dwell,
-    Target,
     Session,
-    Approach { joint: usize },
-}
-
-impl Column {
-    /// Whether only the diagnosis uses it.
-    fn is_a_condition(self) -> bool {
-        matches!(
-            self,
-            Column::Ambient | Column::Payload | Column::Dwell | Column::Target | Column::Session | Column::Approach { .. }
-        )
-    }
+    Target,
 }
 
 const ALLOWED: &str = "pose_id, time_s, q1_rad… (or _deg, _m, _mm), x_m, y_m, z_m (or _mm), qx, qy, qz, qw, role, target, \
@@ -152,20 +141,34 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
                         _ => return Err(wrong(line, format!("`role` is `{text}`; `fit` or `held_out` is needed"))),
                     }
                 }
-                Column::Temperature { sensor } => row.temperatures_c[*sensor] = number()?,
-                Column::Ambient => row.ambient_c = Some(number()?),
-                Column::Payload => row.payload_kg = Some(number()?),
-                Column::Dwell => row.dwell_s = Some(number()?),
-                Column::Target => row.target = Some(text.to_owned()),
-                Column::Session => row.session = Some(text.to_owned()),
+                Column::Temperature { sensor } => {
+                    row.temperatures_c[*sensor] =
+                        above_zero_kelvin(number()?).map_err(|what| wrong(line, format!("`{name}` {what}")))?;
+                }
                 Column::Approach { joint } => {
                     row.approach[*joint] = match number()? {
-                        value if value == -1.0 => -1,
-                        value if value == 0.0 => 0,
-                        value if value == 1.0 => 1,
-                        _ => return Err(wrong(line, format!("`{name}` is `{text}`; -1, 0 or 1 is needed"))),
+                        -1.0 => -1,
+                        0.0 => 0,
+                        1.0 => 1,
+                        _ => {
+                            return Err(wrong(
+                                line,
+                                format!("`{name}` is `{text}`; -1, 0 or 1 is needed: the direction of the last move"),
+                            ));
+                        }
                     }
                 }
+                Column::Ambient => {
+                    row.ambient_c = Some(above_zero_kelvin(number()?).map_err(|what| wrong(line, format!("`{name}` {what}")))?)
+                }
+                Column::Payload => {
+                    row.payload_kg = Some(not_negative(number()?).map_err(|what| wrong(line, format!("`{name}` {what}")))?)
+                }
+                Column::Dwell => {
+                    row.dwell_s = Some(not_negative(number()?).map_err(|what| wrong(line, format!("`{name}` {what}")))?)
+                }
+                Column::Session => row.session = Some(text.to_owned()),
+                Column::Target => row.target = Some(text.to_owned()),
             }
         }
         if let Some(quaternion) = &mut row.attitude_xyzw {
@@ -183,48 +186,79 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
     if measurements.is_empty() {
         return Err(wrong(header_line, "the table has a header but no rows".to_owned()));
     }
-    let unused_columns =
-        header.iter().zip(&columns).filter(|(_, column)| column.is_a_condition()).map(|(name, _)| name.to_owned()).collect();
+    let is_condition = |column: &Column| {
+        use Column::{Ambient, Approach, Dwell, Payload, Session, Target};
+        matches!(column, Approach { .. } | Ambient | Payload | Dwell | Session | Target)
+    };
+    let conditions =
+        header.iter().zip(&columns).filter(|(_, column)| is_condition(column)).map(|(name, _)| name.to_owned()).collect();
     let mut joint_is_length = vec![false; layout.joints];
     for column in &columns {
         if let Column::Joint { joint, is_length, .. } = column {
             joint_is_length[*joint] = *is_length;
         }
     }
-    Ok(Table { measurements, joint_is_length, unused_columns })
+    Ok(Table { measurements, joint_is_length, conditions })
 }
 
-/// Writes `measurements` in the format that [`parse`] reads, bit for bit.
-#[must_use]
-pub fn write(measurements: &[Measurement]) -> String {
+fn not_negative(value: f64) -> Result<f64, String> {
+    if value >= 0.0 { Ok(value) } else { Err(format!("is {value}; 0 or more is needed")) }
+}
+
+fn above_zero_kelvin(value: f64) -> Result<f64, String> {
+    if value > -273.15 { Ok(value) } else { Err(format!("is {value} °C; more than -273.15 is needed")) }
+}
+
+/// Writes `measurements` in the format that [`parse`] reads, bit for bit. Columns that some rows lack are left out.
+///
+/// # Errors
+/// If a text cannot be written as CSV, which none that [`parse`] gave causes.
+pub fn write(measurements: &[Measurement]) -> Result<String, csv::Error> {
+    let every = |has: fn(&Measurement) -> bool| measurements.iter().all(has);
     let joints = measurements.first().map_or(0, |row| row.joints.len());
     let sensors = measurements.iter().map(|row| row.temperatures_c.len()).min().unwrap_or(0);
-    let attitude = measurements.iter().all(|row| row.attitude_xyzw.is_some());
-    let mut text = String::from("pose_id,role,time_s");
-    let columns = (1..=joints).map(|joint| format!("q{joint}_rad")).chain(["x_m", "y_m", "z_m"].map(str::to_owned));
-    let quaternion = attitude.then_some(["qx", "qy", "qz", "qw"]).into_iter().flatten().map(str::to_owned);
-    for name in columns.chain(quaternion).chain((1..=sensors).map(|sensor| format!("temp{sensor}_c"))) {
-        text.push(',');
-        text.push_str(&name);
-    }
-    text.push('\n');
+    let attitude = every(|row| row.attitude_xyzw.is_some());
+    let approach = every(|row| !row.joints.is_empty() && row.approach.len() == row.joints.len());
+    let optional = [
+        ("temp_ambient_c", every(|row| row.ambient_c.is_some())),
+        ("payload_kg", every(|row| row.payload_kg.is_some())),
+        ("dwell_s", every(|row| row.dwell_s.is_some())),
+        ("session", every(|row| row.session.is_some())),
+        ("target", every(|row| row.target.is_some())),
+    ];
+    let names =
+        |present: bool, names: &[&str]| if present { names.iter().map(|name| (*name).to_owned()).collect() } else { Vec::new() };
+    let mut header = names(true, &["pose_id", "role", "time_s"]);
+    header.extend((1..=joints).map(|joint| format!("q{joint}_rad")));
+    header.extend(names(true, &["x_m", "y_m", "z_m"]));
+    header.extend(names(attitude, &["qx", "qy", "qz", "qw"]));
+    header.extend((1..=sensors).map(|sensor| format!("temp{sensor}_c")));
+    header.extend((1..=joints).filter(|_| approach).map(|joint| format!("approach{joint}")));
+    header.extend(optional.iter().filter(|(_, present)| *present).map(|(name, _)| (*name).to_owned()));
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(&header)?;
     for row in measurements {
         let role = if row.role == Role::Fit { "fit" } else { "held_out" };
-        let _ = write!(text, "{},{role},{}", row.pose_id, row.time_s);
+        let mut fields = vec![row.pose_id.to_string(), role.to_owned(), row.time_s.to_string()];
         let quaternion = row.attitude_xyzw.iter().filter(|_| attitude).flatten();
-        for value in row.joints.iter().chain(&row.position_m).chain(quaternion).chain(&row.temperatures_c[..sensors]) {
-            let _ = write!(text, ",{value}");
-        }
-        text.push('\n');
+        let numbers = row.joints.iter().chain(&row.position_m).chain(quaternion).chain(&row.temperatures_c[..sensors]);
+        fields.extend(numbers.map(f64::to_string));
+        fields.extend(row.approach.iter().filter(|_| approach).map(i8::to_string));
+        let number = |value: Option<f64>| value.map(|value| value.to_string());
+        let values =
+            [number(row.ambient_c), number(row.payload_kg), number(row.dwell_s), row.session.clone(), row.target.clone()];
+        fields.extend(optional.iter().zip(values).filter(|((_, present), _)| *present).filter_map(|(_, value)| value));
+        writer.write_record(&fields)?;
     }
-    text
+    let bytes = writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
 struct Layout {
     joints: usize,
     sensors: usize,
-    attitude: bool,
     approaches: usize,
+    attitude: bool,
 }
 
 impl Layout {
@@ -270,12 +304,13 @@ impl Layout {
         let approaches = numbered(columns, |column| match column {
             Column::Approach { joint } => Some(*joint),
             _ => None,
-        })
-        .map_err(|missing| format!("approach columns must be approach1, approach2, … without a gap: approach{} is missing", missing + 1))?;
-        if approaches != 0 && approaches != joints {
-            return Err(format!("{approaches} approach columns for {joints} joints; approach1 to approach{joints} are needed, or none"));
-        }
-        Ok(Layout { joints, sensors, attitude, approaches })
+        });
+        let approaches = match approaches {
+            Ok(0) => 0,
+            Ok(count) if count == joints => count,
+            _ => return Err(format!("directions of approach need approach1 … approach{joints}: one column per joint, or none")),
+        };
+        Ok(Layout { joints, sensors, approaches, attitude })
     }
 }
 
@@ -317,7 +352,7 @@ fn column(name: &str) -> Result<Column, String> {
         };
     }
     if let Some(rest) = name.strip_prefix("approach") {
-        return match rest.parse::<usize>() {
+        return match rest.parse() {
             Ok(joint @ 1..=1000) => Ok(Column::Approach { joint: joint - 1 }),
             _ => unknown(),
         };
@@ -356,7 +391,8 @@ mod tests {
         let row = &table.measurements[0];
         assert_eq!((row.pose_id, row.position_m), (7, [1.0, 2.0, 3.0]));
         assert_eq!(row.joints, [0.5, std::f64::consts::PI]);
-        assert_eq!(table.unused_columns, ["temp_ambient_c"]);
+        assert_eq!(table.conditions, ["temp_ambient_c"]);
+        assert_eq!(row.ambient_c, Some(21.0));
     }
 
     #[test]
@@ -370,10 +406,19 @@ mod tests {
             temperatures_c: vec![20.1, 1.0 / 3.0],
             position_m: [1.0 / 3.0, -2.0 / 7.0, 1e-9],
             attitude_xyzw: Some([0.5, -0.5, 0.5, -0.5]),
-            ..Measurement::default()
+            approach: vec![-1, 0, 1],
+            ambient_c: Some(20.0 + 1.0 / 3.0),
+            payload_kg: Some(0.1 + 0.2),
+            dwell_s: Some(1.5),
+            session: Some("day 2, \"morning\"".to_owned()),
+            target: Some("A".to_owned()),
         };
         let rows = vec![row(0), row(1), row(2)];
-        assert_eq!(parse(&write(&rows), "t.csv").unwrap().measurements, rows);
+        assert_eq!(parse(&write(&rows).unwrap(), "t.csv").unwrap().measurements, rows);
+        // What only some rows have is left out.
+        let some = vec![Measurement { payload_kg: None, approach: Vec::new(), ..row(0) }, row(1)];
+        let back = parse(&write(&some).unwrap(), "t.csv").unwrap();
+        assert_eq!(back.measurements[1], Measurement { payload_kg: None, approach: Vec::new(), ..row(1) });
     }
 
     #[test]
@@ -389,6 +434,11 @@ mod tests {
             ("q1_rad,x_m,y_m,z_m\n0,0,0,0\n0,0,NaN,0\n", "line 3: `y_m` is `NaN`; a finite number is needed"),
             ("q1_rad,x_m,y_m,z_m\n0,0,0\n", "line 2: 3 values, but the header names 4 columns"),
             ("q1_rad,x_m,y_m,z_m,qx,qy,qz,qw\n0,0,0,0,0,0,0,2\n", "line 2: the quaternion (qx, qy, qz, qw) has length 2"),
+            ("q1_rad,x_m,y_m,z_m,approach1\n0,0,0,0,2\n", "line 2: `approach1` is `2`; -1, 0 or 1 is needed"),
+            ("q1_rad,q2_rad,x_m,y_m,z_m,approach1\n", "approach1 … approach2: one column per joint, or none"),
+            ("q1_rad,x_m,y_m,z_m,payload_kg\n0,0,0,0,-1\n", "line 2: `payload_kg` is -1; 0 or more is needed"),
+            ("q1_rad,x_m,y_m,z_m,dwell_s\n0,0,0,0,-1\n", "line 2: `dwell_s` is -1; 0 or more is needed"),
+            ("q1_rad,x_m,y_m,z_m,temp1_c\n0,0,0,0,-300\n", "line 2: `temp1_c` is -300 °C; more than -273.15"),
             ("q1_rad,x_m,x_m,y_m,z_m\n", "column `x_m` stands there twice"),
         ] {
             let message = parse(text, "t.csv").unwrap_err().to_string();

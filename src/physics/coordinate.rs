@@ -13,9 +13,10 @@ pub(super) struct Coordinate {
 pub(super) enum Direction {
     /// About the joint's axis (along it where the joint slides).
     Joint,
-    /// About the x axis of the link, across the joint's.
+    /// About the x axis of the link, across the joint's: with y a Cardan joint. How it shares a large bend between its axes is of
+    /// second order in the bend.
     AcrossX,
-    /// About y.
+    /// About the y axis, turned with the bend about x.
     AcrossY,
 }
 

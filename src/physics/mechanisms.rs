@@ -65,6 +65,9 @@ pub(super) fn shifted(shifts: &[Shift], share: f64) -> Option<Pose> {
     shifts.iter().map(|shift| shift.at(share)).reduce(|before, shift| before * shift)
 }
 
+/// Stiffnesses that joints and links may have: softer ones would not yield by a small motion, stiffer ones not at all.
+const STIFF: std::ops::RangeInclusive<f64> = 100.0..=1e12;
+
 const POSITIVE: &str = "a positive number";
 const SMALL: &str = "between -0.1 and 0.1";
 
@@ -97,6 +100,11 @@ impl Mechanisms {
             Err(PhysicsError::BadEffect { effect: name, place: words(&effect.location()), what, got, expected })
         };
         let positive = |what, got: f64| if got > 0.0 && got.is_finite() { Ok(()) } else { bad(what, got, POSITIVE) };
+        let stiff =
+            |what, got: f64| if STIFF.contains(&got) { Ok(()) } else { bad(what, got, "between 100 and 1e12 (N·m/rad, N/m)") };
+        let soft = |what, got: f64| {
+            if STIFF.contains(&(1.0 / got)) { Ok(()) } else { bad(what, got, "between 1e-12 and 0.01 (rad/(N·m), m/N)") }
+        };
         let finite = |what, got: f64| if got.is_finite() { Ok(()) } else { bad(what, got, "a finite number") };
         let small = |what, got: f64| if got.abs() <= 0.1 { Ok(()) } else { bad(what, got, SMALL) };
         let share = |what, got: f64| if (0.0..=1.0).contains(&got) { Ok(()) } else { bad(what, got, "between 0 and 1") };
@@ -115,12 +123,12 @@ impl Mechanisms {
         match *effect {
             Effect::JointCompliance { joint, stiffness } => {
                 exists("joint", joint)?;
-                positive("stiffness", stiffness)?;
+                stiff("stiffness", stiffness)?;
                 self.yields(joint, Direction::Joint, Law::Spring { stiffness });
             }
             Effect::LinkBending { link, compliance } => {
                 exists("link", link)?;
-                positive("compliance", compliance)?;
+                soft("compliance", compliance)?;
                 for direction in [Direction::AcrossX, Direction::AcrossY] {
                     self.yields(link, direction, Law::Spring { stiffness: 1.0 / compliance });
                 }
@@ -222,7 +230,7 @@ impl Mechanisms {
             }
             Effect::CreepAfterMotion { joint, compliance, time_constant } => {
                 exists("joint", joint)?;
-                positive("compliance", compliance)?;
+                soft("compliance", compliance)?;
                 positive("time constant", time_constant)?;
                 self.yields(joint, Direction::Joint, Law::Creep { compliance, time_constant });
             }
@@ -238,8 +246,10 @@ impl Mechanisms {
                 self.drives[joint].memories.push(Memory { amplitude, travel });
             }
             Effect::WrongPayload { excess, stiffness } => {
-                finite("excess", excess)?;
-                positive("stiffness", stiffness)?;
+                if !(-1000.0..=1000.0).contains(&excess) {
+                    return bad("excess", excess, "between -1000 and 1000 (kg)");
+                }
+                stiff("stiffness", stiffness)?;
                 self.excess_kg += excess;
                 for joint in 0..kinds.len() {
                     self.yields(joint, Direction::Joint, Law::Spring { stiffness });
@@ -247,9 +257,9 @@ impl Mechanisms {
             }
             Effect::HardeningStiffness { joint, stiffness, cubic } => {
                 exists("joint", joint)?;
-                positive("stiffness", stiffness)?;
-                if !(cubic >= 0.0 && cubic.is_finite()) {
-                    return bad("cubic", cubic, "0 or more");
+                stiff("stiffness", stiffness)?;
+                if !(0.0..=1e15).contains(&cubic) {
+                    return bad("cubic", cubic, "between 0 and 1e15 (N·m/rad³)");
                 }
                 self.yields(joint, Direction::Joint, Law::Hardening { stiffness, cubic });
             }

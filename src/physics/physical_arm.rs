@@ -27,7 +27,7 @@ const DRIVE_STEPS: usize = 3;
 const FRICTION_OVER_LOAD: f64 = 3.0;
 
 /// Creep of which less than this share is left is forgotten.
-const CREPT: f64 = 1e-6;
+const CREPT: f64 = 1e-5;
 
 /// What does not change while one pose settles.
 struct Task {

@@ -229,13 +229,8 @@ impl World {
             let mut before = reached * outboard;
             for index in yielding.0..yielding.1 {
                 let YieldingLink { link, axis, .. } = self.yielding[index];
-                self.set_link(
-                    link,
-                    &before,
-                    &Pose::identity(),
-                    &[yielded.coordinates[index]],
-                    Some((axis, yielded.holds[index])),
-                );
+                let hold = Some((axis, yielded.holds[index]));
+                self.set_link(link, &before, &Pose::identity(), &[yielded.coordinates[index]], hold);
                 before = Pose::identity();
             }
             if slide.is_none() && lean.is_none() && yielding.0 == yielding.1 {

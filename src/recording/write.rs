@@ -79,6 +79,8 @@ pub struct Recorder {
     measurements_since_flush: usize,
     bytes_since_flush: usize,
     output_failed: bool,
+    /// Whether what is derived for viewers is left out.
+    sources_only: bool,
 }
 
 impl Recorder {
@@ -121,7 +123,15 @@ impl Recorder {
             measurements_since_flush: 0,
             bytes_since_flush: 0,
             output_failed: false,
+            sources_only: false,
         })
+    }
+
+    /// Leaves out what is derived for viewers: a thousand recordings that a program reads need no pictures.
+    #[must_use]
+    pub fn sources_only(mut self) -> Recorder {
+        self.sources_only = true;
+        self
     }
 
     /// Where the run is being written.
@@ -153,6 +163,9 @@ impl Recorder {
 
     fn record_messages(&mut self, event: &Event) -> Result<(), RecordError> {
         for message in self.encoder.encode(event)? {
+            if self.sources_only && message.topic.message_encoding() != "json" {
+                continue;
+            }
             self.bytes_since_flush += message.data.len();
             self.write(&message).map_err(|source| format(&self.partial, source))?;
         }

@@ -54,14 +54,14 @@ pub fn sweep(cells: &[CellSummary]) -> String {
     let mut header = vec!["effect", "at", "magnitude"];
     header.extend(columns.iter().map(|column| column.name));
     header.extend([
-        "held out RMS (µm)",
-        "effect RMS (µm)",
+        "held out (µm)",
+        "effect (µm)",
         "swallowed (%)",
         "largest bias",
-        "in std errors",
-        "all, RMS",
+        "in σ",
+        "all in σ",
         "coverage (%)",
-        "residuals/noise",
+        "residuals",
     ]);
     let rows = cells
         .iter()
@@ -100,10 +100,11 @@ pub fn sweep(cells: &[CellSummary]) -> String {
         .collect();
     text.push_str(&format!(
         "\nIn all cells: {}. {} trials each; in brackets 95 % intervals of the means over trials.\n\
-         Held out: position error of the calibrated arm on configurations that were not fitted, sensor noise included. Effect: how far \
-         it moves the fitted positions. Swallowed: share of that, in sigmas, which the fitted geometry absorbs. Bias: identified minus \
-         true value of a combination, mean over trials; over its mean stated standard error. Coverage: share of the stated 95 % intervals \
-         that hold the true value.\n",
+         Held out: position error of the calibrated arm on configurations that were not fitted, RMS, sensor noise included.\n\
+         Effect: how far it moves the fitted positions, RMS. Swallowed: share of its energy (in sigmas) that the fitted geometry absorbs.\n\
+         Bias: identified minus true value of a combination, mean over trials; in σ: over its mean stated standard error; all: RMS over \
+         combinations.\n\
+         Coverage: share of the stated 95 % intervals of the combinations that hold the true value. Residuals: over the declared noise.\n",
         fixed.join(", "),
         cells[0].trials
     ));
@@ -242,7 +243,7 @@ pub fn figure(scene: &str, cells: &[CellSummary]) -> Figure {
         lines = cells.iter().map(|cell| (conditions(&cell.what).join(", "), vec![cell])).collect();
     }
     let sort = cells.iter().find_map(|cell| Sort::from_name(&cell.what.effect)).filter(|_| single);
-    let (unit, factor) = sort.map_or(("SI", 1.0), |sort| units(sort.unit())[0]);
+    let (unit, factor) = sort.map_or(("SI", 1.0), |sort| units(sort)[0]);
     let x = || {
         let what = sort.map_or("magnitude".to_owned(), |sort| sort.name().replace('_', " "));
         Axis::linear(format!("{what} ({unit})")).zero()

@@ -2,12 +2,13 @@
 
 use nalgebra::{Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 
+use super::effect_file;
 use super::error::{Invalid, suggestion};
 use super::file::*;
 use super::urdf;
 use super::{
-    Approach, ApproachPolicy, DesignProblem, EvennessDomain, Injected, JacobianScaling, JointClearance, Noise, Plan, Scene,
-    Swarm, Thermal, ThermalProfile, Weights,
+    Approach, DesignProblem, EvennessDomain, Injected, JacobianScaling, Noise, Plan, Scene, Swarm, Temperature, ThermalProfile,
+    Weights,
 };
 use crate::arm::{Arm, Fixture, Geometry, Inertial, Link, Shape};
 use crate::frames::Pose;
@@ -16,7 +17,7 @@ use crate::kinematics::urdf::rpy::{rotation_from_rpy, z_onto};
 use crate::kinematics::{Chain, Joint, JointKind, Quantity, Step};
 use crate::measurement::{Sensor, View};
 
-type Checked<T> = Result<T, Invalid>;
+pub(super) type Checked<T> = Result<T, Invalid>;
 
 fn metres_from_mm(mm: f64) -> f64 {
     mm / 1e3
@@ -57,7 +58,7 @@ pub(super) fn scene(file: &SceneToml) -> Checked<Scene> {
         }
     }
     let design = design(&file.design, &arm, &sensor)?;
-    let plan = plan(&file.plan)?;
+    let plan = plan(&file.plan, &arm)?;
     Ok(Scene {
         name: file.name.clone(),
         description: file.description.clone(),
@@ -94,14 +95,14 @@ fn seed(seed: u64, key: &str) -> Checked<()> {
     Err(Invalid::new(key, seed.to_string(), allowed, "choose a smaller seed"))
 }
 
-fn not_negative(value: f64, key: &str) -> Checked<f64> {
+pub(super) fn not_negative(value: f64, key: &str) -> Checked<f64> {
     if value >= 0.0 {
         return Ok(value);
     }
     Err(Invalid::new(key, value.to_string(), "0 or more", "give the amount without a sign"))
 }
 
-fn positive(value: f64, key: &str) -> Checked<f64> {
+pub(super) fn positive(value: f64, key: &str) -> Checked<f64> {
     if value > 0.0 {
         return Ok(value);
     }
@@ -116,7 +117,7 @@ fn count(value: usize, most: usize, key: &str, remedy: &str) -> Checked<usize> {
     Err(Invalid::new(key, value.to_string(), format!("1 or more, {most} at most"), remedy))
 }
 
-fn at_most(value: f64, most: f64, key: &str) -> Checked<f64> {
+pub(super) fn at_most(value: f64, most: f64, key: &str) -> Checked<f64> {
     if value <= most {
         return Ok(value);
     }
@@ -503,9 +504,9 @@ fn design(file: &DesignToml, arm: &Arm, sensor: &Sensor) -> Checked<DesignProble
     })
 }
 
-fn plan(file: &PlanToml) -> Checked<Plan> {
+fn plan(file: &PlanToml, arm: &Arm) -> Checked<Plan> {
     let reference_temperature_c = file.reference_temperature_c;
-    if reference_temperature_c <= -273.15 {
+    if reference_temperature_c <= ABSOLUTE_ZERO_C {
         return Err(Invalid::new(
             "plan.reference_temperature_c",
             reference_temperature_c.to_string(),
@@ -518,18 +519,58 @@ fn plan(file: &PlanToml) -> Checked<Plan> {
         held_out_exact: file.held_out_exact,
         seconds_per_pose: at_most(positive(file.seconds_per_pose, "plan.seconds_per_pose")?, 1e6, "plan.seconds_per_pose")?,
         reference_temperature_c,
-        repeats: 1,
-        approach: Approach { policy: ApproachPolicy::Direct, travel_rad: 0.1, travel_m: 0.01 },
-        dwell_s: 0.0,
-        payloads_kg: vec![0.0],
-        payload_blocks: false,
-        temperature: None,
+        repeats: count(file.repeats, 1000, "plan.repeats", "each configuration is read so many times")?,
+        approach: Approach {
+            policy: file.approach,
+            travel_rad: positive(file.approach_travel_deg, "plan.approach_travel_deg")?.to_radians(),
+            travel_m: metres_from_mm(positive(file.approach_travel_mm, "plan.approach_travel_mm")?),
+        },
+        dwell_s: at_most(not_negative(file.dwell_s, "plan.dwell_s")?, file.seconds_per_pose, "plan.dwell_s")?,
+        payloads_kg: payloads(&file.payloads_kg)?,
+        payload_blocks: file.payload_blocks,
+        temperature: file.temperature.as_ref().map(|file| temperature(file, reference_temperature_c, arm)).transpose()?,
     })
 }
 
-/// A play, no larger than a small motion: beyond it the seat of a bearing is another thing, and a unit was probably mistaken.
-fn play(value: f64, most: f64, key: String) -> Checked<f64> {
-    at_most(not_negative(value, &key)?, most, &key)
+fn payloads(file: &[f64]) -> Checked<Vec<f64>> {
+    let key = "plan.payloads_kg";
+    if file.is_empty() {
+        return Err(Invalid::new(key, "an empty list", "one mass or more", "write [0] for a tool that carries nothing"));
+    }
+    file.iter().map(|mass| at_most(not_negative(*mass, key)?, 1e3, key)).collect()
+}
+
+/// 0 K in °C.
+const ABSOLUTE_ZERO_C: f64 = -273.15;
+
+fn temperature(file: &TemperatureToml, reference_c: f64, arm: &Arm) -> Checked<Temperature> {
+    let warm_enough = |rise: f64, key: &str| {
+        if reference_c + rise > ABSOLUTE_ZERO_C {
+            return Ok(rise);
+        }
+        let found = format!("{rise}, which makes {} °C", reference_c + rise);
+        Err(Invalid::new(
+            key,
+            found,
+            format!("more than {}", ABSOLUTE_ZERO_C - reference_c),
+            "there is nothing below absolute zero",
+        ))
+    };
+    let rise_k = each_link(&file.rise_k, "plan.temperature.rise_k", arm)?;
+    let lag_s = each_link(&file.lag_s, "plan.temperature.lag_s", arm)?;
+    Ok(Temperature {
+        profile: match file.profile {
+            ThermalProfileToml::Constant => ThermalProfile::Constant,
+            ThermalProfileToml::WarmUp => ThermalProfile::WarmUp,
+            ThermalProfileToml::HeatAndCool => ThermalProfile::HeatAndCool,
+        },
+        rise_k: rise_k.into_iter().map(|rise| warm_enough(rise, "plan.temperature.rise_k")).collect::<Checked<_>>()?,
+        lag_s: lag_s
+            .into_iter()
+            .map(|lag| at_most(not_negative(lag, "plan.temperature.lag_s")?, 1e6, "plan.temperature.lag_s"))
+            .collect::<Checked<_>>()?,
+        ambient_rise_k: warm_enough(file.ambient_rise_k, "plan.temperature.ambient_rise_k")?,
+    })
 }
 
 /// The hidden part, checked against the arm it is about.
@@ -541,34 +582,29 @@ pub(super) fn injected(file: &InjectedToml, arm: &Arm) -> Checked<Injected> {
     }
     // In column order, whatever the order of the file.
     parameter_errors.sort_by_key(|(name, _)| arm.chain.parameters.iter().position(|parameter| parameter.name == *name));
-    let mut clearances: Vec<JointClearance> = Vec::with_capacity(file.clearance.len());
-    for (index, clearance) in file.clearance.iter().enumerate() {
-        let key = format!("injected.clearance[{}]", index + 1);
-        let Some(joint) = arm.chain.joints.iter().position(|joint| joint.name == clearance.joint) else {
-            let names: Vec<&str> = arm.chain.joints.iter().map(|joint| joint.name.as_str()).collect();
-            let remedy = suggestion(&clearance.joint, &names).unwrap_or_else(|| "name a joint of this arm".to_owned());
-            return Err(Invalid::new(format!("{key}.joint"), format!("{:?}", clearance.joint), names.join(", "), remedy));
-        };
-        if clearances.iter().any(|other| other.joint == joint) {
-            let found = format!("{:?} for the second time", clearance.joint);
-            return Err(Invalid::new(format!("{key}.joint"), found, "one [[injected.clearance]] per joint", "merge the two"));
-        }
-        clearances.push(JointClearance {
-            joint,
-            radial_m: metres_from_um(play(clearance.radial_um, 1e3, format!("{key}.radial_um"))?),
-            axial_m: metres_from_um(play(clearance.axial_um, 1e3, format!("{key}.axial_um"))?),
-            tilt_rad: play(clearance.tilt_urad, 1e4, format!("{key}.tilt_urad"))? / 1e6,
-        });
+    let moved = [
+        (
+            "thermal",
+            file.thermal.is_some(),
+            "its course belongs into [plan.temperature] (profile, rise_k), its expansion into an \
+          [[injected.effect]] with kind = \"link_thermal_growth\" and expansion_um_per_m_per_k",
+        ),
+        ("clearance", file.clearance.is_some(), "write [[injected.effect]] with kind = \"clearance\" and the same keys"),
+    ];
+    if let Some((name, _, remedy)) = moved.into_iter().find(|(_, given, _)| *given) {
+        let found = format!("a section `{name}` of an earlier version");
+        return Err(Invalid::new(format!("injected.{name}"), found, "parameters, effect, noise", remedy));
     }
-    let thermal = file.thermal.as_ref().map(|thermal| self::thermal(thermal, arm)).transpose()?;
+    let mut effects = Vec::with_capacity(file.effect.len());
+    for (index, effect) in file.effect.iter().enumerate() {
+        effects.extend(effect_file::effects(effect, &format!("injected.effect[{}]", index + 1), arm)?);
+    }
     Ok(Injected {
         seed: file.seed.clone(),
         length_error_m: metres_from_mm(not_negative(parameters.length_mm, "injected.parameters.length_mm")?),
         angle_error_rad: not_negative(parameters.angle_deg, "injected.parameters.angle_deg")?.to_radians(),
         parameter_errors,
-        clearances,
-        thermal,
-        effects: Vec::new(),
+        effects,
         noise: noise(&file.noise)?,
     })
 }
@@ -594,32 +630,18 @@ fn parameter_error(key: &str, value: f64, arm: &Arm) -> Checked<(String, f64)> {
     Ok((parameter.name.clone(), value))
 }
 
-fn thermal(file: &ThermalToml, arm: &Arm) -> Checked<Thermal> {
-    let each = |values: &OneOrEach, key: &str| -> Checked<Vec<f64>> {
-        match values {
-            OneOrEach::One(value) => Ok(vec![*value; arm.links.len()]),
-            OneOrEach::Each(values) if values.len() == arm.links.len() => Ok(values.clone()),
-            OneOrEach::Each(values) => Err(Invalid::new(
-                format!("injected.thermal.{key}"),
-                format!("{} numbers", values.len()),
-                format!("one number, or {}: one per link, base link first", arm.links.len()),
-                "give as many as there are links",
-            )),
-        }
-    };
-    let expansion = each(&file.expansion_um_per_m_per_k, "expansion_um_per_m_per_k")?;
-    for value in &expansion {
-        not_negative(*value, "injected.thermal.expansion_um_per_m_per_k")?;
+/// One number for every link, or one for each, base link first.
+pub(super) fn each_link(values: &OneOrEach, key: &str, arm: &Arm) -> Checked<Vec<f64>> {
+    match values {
+        OneOrEach::One(value) => Ok(vec![*value; arm.links.len()]),
+        OneOrEach::Each(values) if values.len() == arm.links.len() => Ok(values.clone()),
+        OneOrEach::Each(values) => Err(Invalid::new(
+            key,
+            format!("{} numbers", values.len()),
+            format!("one number, or {}: one per link, base link first", arm.links.len()),
+            "give as many as there are links",
+        )),
     }
-    Ok(Thermal {
-        expansion_per_k: expansion.into_iter().map(|expansion| expansion / 1e6).collect(),
-        rise_k: each(&file.rise_k, "rise_k")?,
-        profile: match file.profile {
-            ThermalProfileToml::Constant => ThermalProfile::Constant,
-            ThermalProfileToml::WarmUp => ThermalProfile::WarmUp,
-            ThermalProfileToml::HeatAndCool => ThermalProfile::HeatAndCool,
-        },
-    })
 }
 
 fn noise(file: &NoiseToml) -> Checked<Noise> {

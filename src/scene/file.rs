@@ -10,7 +10,8 @@ use std::fmt;
 use serde::de::{self, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::{Criterion, Method};
+use super::effect::Moves;
+use super::{ApproachPolicy, Criterion, Method};
 
 /// The whole file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -436,6 +437,62 @@ pub struct PlanToml {
     /// At which the nominal arm is nominal, °C. Default: 20.
     #[serde(default = "reference_temperature_c")]
     pub reference_temperature_c: f64,
+    /// Readings of each configuration, each approached anew. Default: 1; without repeats the noise cannot be told from the data.
+    #[serde(default = "one")]
+    pub repeats: usize,
+    /// From which side the joints come. Default: direct.
+    #[serde(default)]
+    pub approach: ApproachPolicy,
+    /// How far the last move is where the policy makes one; joints that turn. Default: 5.
+    #[serde(default = "approach_travel")]
+    pub approach_travel_deg: f64,
+    /// The same for joints that slide. Default: 5.
+    #[serde(default = "approach_travel")]
+    pub approach_travel_mm: f64,
+    /// From the end of a move to the reading, s. Default: 0.
+    #[serde(default)]
+    pub dwell_s: f64,
+    /// Masses that the tool carries; configurations take them in turn. Default: none.
+    #[serde(default = "no_payload")]
+    pub payloads_kg: Vec<f64>,
+    /// Whether payloads are measured one after the other. Default: no, in mixed order.
+    #[serde(default)]
+    pub payload_blocks: bool,
+    /// `[plan.temperature]`; absent: nothing warms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<TemperatureToml>,
+}
+
+fn one() -> usize {
+    1
+}
+
+fn approach_travel() -> f64 {
+    5.0
+}
+
+fn no_payload() -> Vec<f64> {
+    vec![0.0]
+}
+
+/// `[plan.temperature]`: course of the temperatures over the session.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TemperatureToml {
+    /// Course over the session.
+    pub profile: ThermalProfileToml,
+    /// Largest rise over the reference temperature, K: one number, or one per link, base link first.
+    pub rise_k: OneOrEach,
+    /// Time constant with which a link follows, s: one number, or one per link. Default: 0, at once.
+    #[serde(default = "at_once")]
+    pub lag_s: OneOrEach,
+    /// Largest rise of the air, K. Default: 0.
+    #[serde(default)]
+    pub ambient_rise_k: f64,
+}
+
+fn at_once() -> OneOrEach {
+    OneOrEach::One(0.0)
 }
 
 fn seconds_per_pose() -> f64 {
@@ -471,15 +528,18 @@ pub struct InjectedToml {
     /// `[injected.parameters]`; absent: none is wrong.
     #[serde(default)]
     pub parameters: ParametersToml,
-    /// `[injected.thermal]`; absent: no link warms.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub thermal: Option<ThermalToml>,
     /// `[injected.noise]`; absent: as declared.
     #[serde(default)]
     pub noise: NoiseToml,
-    /// `[[injected.clearance]]`
+    /// `[[injected.effect]]`
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub clearance: Vec<ClearanceToml>,
+    pub effect: Vec<EffectToml>,
+    /// Sections of earlier versions; refused with what to write instead.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thermal: Option<toml::Value>,
+    /// As `thermal`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clearance: Option<toml::Value>,
 }
 
 /// `[injected.parameters]`: errors of the geometric parameters.
@@ -495,33 +555,109 @@ pub struct ParametersToml {
     pub errors: BTreeMap<String, f64>,
 }
 
-/// `[[injected.clearance]]`: play of one joint's bearing.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// `[[injected.effect]]`: something that is wrong with arm, cell or sensor besides the parameters. Which keys belong to which kind is
+/// written in [`super::effect_file::KINDS`], which `kincal effects` prints.
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ClearanceToml {
-    /// The joint's name.
-    pub joint: String,
-    /// Radius of the disc in which the joint's centre may lie, µm. Default: 0.
-    #[serde(default)]
-    pub radial_um: f64,
-    /// Half width along the axis, µm. Default: 0.
-    #[serde(default)]
-    pub axial_um: f64,
-    /// Radius of the disc of the tilt, µrad. Default: 0.
-    #[serde(default)]
-    pub tilt_urad: f64,
-}
-
-/// `[injected.thermal]`: links that grow as they warm.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ThermalToml {
+pub struct EffectToml {
+    /// Kind of effect.
+    pub kind: String,
+    /// Name of the joint.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint: Option<String>,
+    /// Name of the link.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub link: Option<String>,
+    /// Name of the joint whose motion leaks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
+    /// What drifts or steps. Default: base.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moves: Option<Moves>,
+    /// Periods per turn: 1 or 2.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub order: Option<u8>,
+    /// N·m/rad (kN/m where the joint slides).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stiffness_nm_per_rad: Option<f64>,
+    /// Nm/mrad³: torque per cube of the angle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cubic_nm_per_mrad3: Option<f64>,
+    /// µrad per N·m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub compliance_urad_per_nm: Option<f64>,
+    /// µrad per N·m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain_urad_per_nm: Option<f64>,
+    /// Full width of the play.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub width_arcsec: Option<f64>,
+    /// Amplitude of the angle error.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub amplitude_arcsec: Option<f64>,
+    /// Phase of the angle error.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub phase_deg: Option<f64>,
+    /// Gear ratio N.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ratio: Option<f64>,
+    /// Error of the gear ratio.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ratio_error_urad_per_rad: Option<f64>,
+    /// Leak from the source joint.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coupling_urad_per_rad: Option<f64>,
     /// Expansion, µm/m/K: one number, or one per link, base link first.
-    pub expansion_um_per_m_per_k: OneOrEach,
-    /// Largest rise over the reference temperature, K: one number, or one per link, base link first.
-    pub rise_k: OneOrEach,
-    /// Course over the session.
-    pub profile: ThermalProfileToml,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expansion_um_per_m_per_k: Option<OneOrEach>,
+    /// Drift of the joint's zero.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drift_urad_per_k: Option<f64>,
+    /// Radius of the disc in which the joint's centre may lie.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radial_um: Option<f64>,
+    /// Half width along the axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axial_um: Option<f64>,
+    /// Radius of the disc of the tilt.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tilt_urad: Option<f64>,
+    /// Of the base or sensor, in base axes; of the tool, in tool axes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub translation_um: Option<[f64; 3]>,
+    /// The same as a rotation vector. Default: 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation_urad: Option<[f64; 3]>,
+    /// Share of the session (0 to 1) after which it happens.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub after: Option<f64>,
+    /// Relative error of the sensor's distances.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale_ppm: Option<f64>,
+    /// Share of the readings, 0 to 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub share: Option<f64>,
+    /// Noise of these readings over the declared one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub factor: Option<f64>,
+    /// How far the output falls behind in the middle of the worn sector.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_arcsec: Option<f64>,
+    /// Middle of the worn sector.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub centre_deg: Option<f64>,
+    /// Half of its width.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub half_width_deg: Option<f64>,
+    /// Time constant.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_constant_s: Option<f64>,
+    /// Way over which the memory fades.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub travel_deg: Option<f64>,
+    /// True minus recorded payload.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub excess_kg: Option<f64>,
 }
 
 /// Course of the temperature.

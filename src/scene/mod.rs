@@ -2,6 +2,7 @@
 
 mod convert;
 pub mod effect;
+pub mod effect_file;
 mod error;
 pub mod file;
 mod magnitude;
@@ -334,38 +335,10 @@ pub struct Injected {
     pub angle_error_rad: f64,
     /// Errors given by name (m or rad), in place of drawn ones; in column order.
     pub parameter_errors: Vec<(String, f64)>,
-    /// Clearance of joints.
-    pub clearances: Vec<JointClearance>,
-    /// Thermal state.
-    pub thermal: Option<Thermal>,
     /// What is wrong with arm, cell and sensor besides the parameters; effects of one kind at one place add up.
     pub effects: Vec<effect::Effect>,
     /// True noise of the readings.
     pub noise: Noise,
-}
-
-/// Clearance of one joint.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct JointClearance {
-    /// Joint, from 0.
-    pub joint: usize,
-    /// Radius of the disc in which the joint's centre may lie, m.
-    pub radial_m: f64,
-    /// Half width along the axis, m.
-    pub axial_m: f64,
-    /// Radius of the disc of the tilt, rad.
-    pub tilt_rad: f64,
-}
-
-/// Growth of the links with temperature.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Thermal {
-    /// Expansion of each link, base link first, 1/K.
-    pub expansion_per_k: Vec<f64>,
-    /// Largest rise of each link over the reference temperature, K.
-    pub rise_k: Vec<f64>,
-    /// Course over the session.
-    pub profile: ThermalProfile,
 }
 
 /// Course of the temperature over the session.

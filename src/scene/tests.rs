@@ -2,6 +2,8 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, Point3, Vector3};
 
+use super::effect::{Effect, Moves};
+use super::effect_file::KINDS;
 use super::*;
 use crate::arm::Geometry;
 use crate::kinematics::Quantity;
@@ -66,7 +68,7 @@ fn what_is_wrong_is_named_with_line_key_and_remedy() {
             "position_noise_mm = 0.015",
             &["did you mean `position_noise_um`? small lengths are in µm here"],
         ),
-        ("radial_um = 30", 1, "radial_mm = 0.03", &["injected.clearance[2].radial_mm", "did you mean `radial_um`?"]),
+        ("radial_um = 30", 1, "radial_mm = 0.03", &["injected.effect[2].radial_mm", "did you mean `radial_um`?"]),
         ("xx = 0.1119", 0, "xxx = 0.1119", &["arm.frame[1].link.inertia_kg_m2.xxx", "xx, yy, zz, xy, xz, yz"]),
         ("capsule", 0, "pill", &["arm.frame[1].link.shapes[1]", "`pill`", "capsule, cylinder, box, sphere"]),
         ("radius_mm = 65", 0, "radius_mm = 65, height_mm = 3", &["height_mm", "from_mm, to_mm, radius_mm"]),
@@ -83,8 +85,8 @@ fn what_is_wrong_is_named_with_line_key_and_remedy() {
             &["constant, warm-up, heat-and-cool", "did you mean `warm-up`?"],
         ),
         ("convention = \"mdh5\"", 0, "convention = \"dh\"", &["arm.convention", "`dh`", "mdh5"]),
-        ("rise_k = [3,", 0, "rise_k = [\"3\",", &["injected.thermal.rise_k[1]", "a number"]),
-        ("rise_k = [3, 8,", 0, "rise_k = [3,", &["injected.thermal.rise_k", "8 numbers", "one number, or 9"]),
+        ("rise_k = [3,", 0, "rise_k = [\"3\",", &["plan.temperature.rise_k[1]", "a number"]),
+        ("rise_k = [3, 8,", 0, "rise_k = [3,", &["plan.temperature.rise_k", "8 numbers", "one number, or 9"]),
         ("profile = \"heat-and-cool\"", 0, "profile = heat", &["TOML"]),
         ("[sensor]", 0, "[sensor", &["TOML"]),
         // Values.
@@ -120,9 +122,8 @@ fn what_is_wrong_is_named_with_line_key_and_remedy() {
         ("inertia = [0.4, 0.95]", 0, "inertia = [0.95, 0.4]", &["design.swarm.inertia", "put the smaller one first"]),
         ("seconds_per_pose = 20", 0, "seconds_per_pose = 0", &["plan.seconds_per_pose", "more than 0"]),
         // The hidden section.
-        ("joint = \"joint4\"", 0, "joint = \"joint9\"", &["injected.clearance[2].joint", "\"joint9\"", "joint7, joint8"]),
-        ("joint = \"joint4\"", 0, "joint = \"joint2\"", &["injected.clearance[2].joint", "second time"]),
-        ("tilt_urad = 100", 2, "tilt_urad = -1", &["injected.clearance[3].tilt_urad", "0 or more"]),
+        ("joint = \"joint4\"", 0, "joint = \"joint9\"", &["injected.effect[2].joint", "\"joint9\"", "joint7, joint8"]),
+        ("tilt_urad = 100", 2, "tilt_urad = -1", &["injected.effect[3].tilt_urad", "0 or more"]),
         ("length_mm = 1.0", 0, "length_mm = -1.0", &["injected.parameters.length_mm", "0 or more"]),
         (
             "angle_deg = 0.2",
@@ -146,7 +147,7 @@ fn what_is_missing_is_named_with_the_line_of_its_table() {
         ("alpha_deg = -90", "[[arm.frame]]", "arm.frame[2]", "`alpha_deg` is missing"),
         ("mass_kg = 10", "[arm.frame.link]", "arm.frame[2].link", "`mass_kg` missing"),
         ("count = 40", "[design]", "design", "`count` is missing"),
-        ("profile = \"heat-and-cool\"", "[injected.thermal]", "injected.thermal", "`profile` is missing"),
+        ("profile = \"heat-and-cool\"", "[plan.temperature]", "plan.temperature", "`profile` is missing"),
     ];
     for (line, header, key, found) in cases {
         let message = message(&without(line));
@@ -238,13 +239,16 @@ fn overrides_are_validated_and_written() {
     file.set_injected_seed("99").expect("allowed");
     file.set("design.swarm.particles", "5").expect("allowed");
     file.set("arm.frame[3].joint.upper_deg", "100.5").expect("allowed");
-    file.set("injected.clearance[2].radial_um", "0").expect("allowed");
+    file.set("injected.effect[2].radial_um", "0").expect("allowed");
     file.set("arm.frame[1].link.shapes[1].capsule.to_mm[3]", "240").expect("allowed");
     assert_eq!((file.scene.seed, file.scene.design.count, file.scene.plan.held_out_count), (7, 12, 3));
     assert_eq!(file.scene.design.swarm.particles, 5);
     assert_eq!(file.scene.arm.chain.joints[2].upper, 100.5f64.to_radians());
     let injected = file.injected.clone().expect("still there");
-    assert_eq!((injected.seed.as_str(), injected.clearances[1].radial_m), ("99", 0.0));
+    assert_eq!(
+        (injected.seed.as_str(), &injected.effects[1]),
+        ("99", &Effect::Clearance { joint: 3, radial: 0.0, axial: 10e-6, tilt: 100e-6 })
+    );
     let back = parse(&file.public_toml().expect("it can be written"), "public").expect("valid");
     assert_eq!(back.scene, file.scene);
 
@@ -282,10 +286,13 @@ fn units_become_si_once() {
     assert_eq!(scene.sensor.position_sigma_per_m, 6e-6);
     assert_eq!(scene.design.evenness_step_m, 0.1);
     let injected = file.injected.as_ref().expect("injected");
-    assert_eq!(injected.clearances[0], JointClearance { joint: 1, radial_m: 30e-6, axial_m: 10e-6, tilt_rad: 100e-6 });
+    assert_eq!(injected.effects[0], Effect::Clearance { joint: 1, radial: 30e-6, axial: 10e-6, tilt: 100e-6 });
     assert_eq!(injected.length_error_m, 1e-3);
-    let thermal = injected.thermal.as_ref().expect("thermal");
-    assert_eq!((thermal.expansion_per_k[1], thermal.expansion_per_k.len(), thermal.rise_k[2]), (23e-6, 9, 10.0));
+    // All as the foot, and every link by what it exceeds the foot.
+    assert_eq!(injected.effects[3], Effect::LinkThermalGrowth { link: None, expansion: 12e-6 });
+    assert_eq!(injected.effects[11], Effect::LinkThermalGrowth { link: Some(7), expansion: 11e-6 });
+    let temperature = scene.plan.temperature.as_ref().expect("it warms");
+    assert_eq!((temperature.rise_k[2], temperature.rise_k.len(), temperature.lag_s.clone()), (10.0, 9, vec![0.0; 9]));
     let Noise::Uniform { position_m, attitude_rad } = paper.injected.as_ref().expect("injected").noise else {
         panic!("the paper's noise is uniform")
     };
@@ -320,7 +327,7 @@ fn optional_parts_are_read() {
     assert_eq!(file.scene.arm.gravity_in_base, Vector3::new(0.0, 0.0, -9.81));
     assert_eq!(file.scene.sensor.attitude_sigma_rad, None);
     let injected = file.injected.expect("injected");
-    assert_eq!(injected.thermal.expect("thermal").rise_k, [10.0; 9]);
+    assert_eq!(file.scene.plan.temperature.expect("it warms").rise_k, [10.0; 9]);
     let names: Vec<&str> = injected.parameter_errors.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["base_yaw", "a2", "theta3"]);
     assert_eq!(injected.parameter_errors[1].1, -0.3e-3);
@@ -501,7 +508,7 @@ fn overrides_of_an_arm_from_a_urdf() {
     file.set("arm.gravity_m_s2", "[0, 0, 9.81]").expect("allowed");
     file.set("arm.uncollidable", "[[\"panda_link7\", \"panda_link5\"]]").expect("allowed");
     file.set("injected.parameters.errors", "{ panda_joint4_x_mm = 1, tool_roll_deg = -0.5 }").expect("allowed");
-    file.set("injected.clearance", "[{ joint = \"panda_joint2\", radial_um = 30 }]").expect("allowed");
+    file.set("injected.effect", "[{ kind = \"radial_clearance\", joint = \"panda_joint2\", radial_um = 30 }]").expect("allowed");
     let fixture =
         "{ name = \"floor\", may_touch = [\"panda_link0\"], shape = { sphere = { centre_mm = [0, 0, -90], radius_mm = 99 } } }";
     file.set("arm.fixture", &format!("[{fixture}]")).expect("allowed");
@@ -510,7 +517,7 @@ fn overrides_of_an_arm_from_a_urdf() {
     assert_eq!(file.scene.arm.gravity_in_base.z, 9.81);
     let injected = file.injected.clone().expect("injected");
     assert_eq!(injected.parameter_errors[0], ("panda_joint4_x".to_owned(), 1e-3));
-    assert_eq!(injected.clearances[0].joint, 1);
+    assert_eq!(injected.effects[0], Effect::Clearance { joint: 1, radial: 30e-6, axial: 0.0, tilt: 0.0 });
     // The arm ends earlier: what hangs behind is frozen, and its links are none of the arm's.
     let refused = file.set("arm.urdf_tip_link", "\"panda_link6\"").expect_err("link 7 is in uncollidable").to_string();
     assert!(refused.contains("arm.uncollidable[1][1]") && refused.contains("did you mean `panda_link"), "{refused}");
@@ -752,5 +759,183 @@ fn a_sensor_sees_its_cone() {
         for fragment in *expected {
             assert!(message.contains(fragment), "{fragment:?} is not in\n{message}");
         }
+    }
+}
+
+/// arm8 with the effects of `tables` in place of its own.
+fn with_effects(tables: &str) -> Result<SceneFile, SceneError> {
+    let own = ARM8.find("# Play of the bearings").expect("the effects come last");
+    parse(&format!("{}{tables}", &ARM8[..own]), "cell.toml")
+}
+
+#[test]
+fn every_kind_of_effect_becomes_what_its_table_says() {
+    let arcsec = std::f64::consts::PI / 648_000.0;
+    let vector = |x, y, z| Vector3::new(x, y, z) / 1e6;
+    let cases = [
+        (
+            "joint_compliance",
+            "joint = \"joint2\"\nstiffness_nm_per_rad = 2e4",
+            Effect::JointCompliance { joint: 1, stiffness: 2e4 },
+        ),
+        (
+            "link_bending",
+            "link = \"link3\"\ncompliance_urad_per_nm = 10",
+            Effect::LinkBending { link: 2, compliance: 10.0 / 1e6 },
+        ),
+        ("backlash", "joint = \"joint3\"\nwidth_arcsec = 60", Effect::Backlash { joint: 2, width: 60.0 * arcsec }),
+        (
+            "gravity_lost_motion",
+            "joint = \"joint8\"\nwidth_arcsec = 60",
+            Effect::GravityLostMotion { joint: 7, width: 60.0 * arcsec },
+        ),
+        (
+            "joint_eccentricity",
+            "joint = \"joint1\"\namplitude_arcsec = 30\norder = 2\nphase_deg = 180",
+            Effect::JointEccentricity { joint: 0, amplitude: 30.0 * arcsec, order: 2, phase: std::f64::consts::PI },
+        ),
+        (
+            "strain_wave_error",
+            "joint = \"joint1\"\namplitude_arcsec = 20\nratio = 100",
+            Effect::StrainWaveError { joint: 0, amplitude: 20.0 * arcsec, ratio: 100.0, phase: 0.0 },
+        ),
+        (
+            "gear_coupling",
+            "joint = \"joint6\"\ncoupling_urad_per_rad = -100\nsource = \"joint5\"",
+            Effect::GearCoupling { joint: 5, ratio_error: 0.0, coupling: -100.0 / 1e6, source: 4 },
+        ),
+        (
+            "link_thermal_growth",
+            "link = \"link4\"\nexpansion_um_per_m_per_k = 23",
+            Effect::LinkThermalGrowth { link: Some(3), expansion: 23.0 / 1e6 },
+        ),
+        (
+            "joint_thermal_drift",
+            "joint = \"joint4\"\ndrift_urad_per_k = -9",
+            Effect::JointThermalDrift { joint: 3, drift: -9.0 / 1e6 },
+        ),
+        (
+            "radial_clearance",
+            "joint = \"joint3\"\nradial_um = 30",
+            Effect::Clearance { joint: 2, radial: 30e-6, axial: 0.0, tilt: 0.0 },
+        ),
+        (
+            "tilt_clearance",
+            "joint = \"joint3\"\ntilt_urad = 90",
+            Effect::Clearance { joint: 2, radial: 0.0, axial: 0.0, tilt: 90.0 / 1e6 },
+        ),
+        ("clearance", "joint = \"joint3\"\naxial_um = 10", Effect::Clearance { joint: 2, radial: 0.0, axial: 10e-6, tilt: 0.0 }),
+        (
+            "base_drift",
+            "translation_um = [1, 2, 3]\nmoves = \"sensor\"",
+            Effect::BaseDrift { moves: Moves::Sensor, translation: vector(1.0, 2.0, 3.0), rotation: Vector3::zeros() },
+        ),
+        (
+            "base_step",
+            "translation_um = [1, 2, 3]\nrotation_urad = [4, 5, 6]\nafter = 0.5",
+            Effect::BaseStep {
+                moves: Moves::Base,
+                translation: vector(1.0, 2.0, 3.0),
+                rotation: vector(4.0, 5.0, 6.0),
+                after: 0.5,
+            },
+        ),
+        (
+            "tool_step",
+            "translation_um = [100, 0, 0]\nafter = 0.25",
+            Effect::ToolStep { translation: vector(100.0, 0.0, 0.0), rotation: Vector3::zeros(), after: 0.25 },
+        ),
+        ("measurement_scale", "scale_ppm = -40", Effect::MeasurementScale { scale: -40.0 / 1e6 }),
+        ("measurement_outliers", "share = 0.05\nfactor = 10", Effect::MeasurementOutliers { share: 0.05, factor: 10.0 }),
+        (
+            "worn_tooth_sector",
+            "joint = \"joint2\"\ndepth_arcsec = 80\ncentre_deg = 90\nhalf_width_deg = 180",
+            Effect::WornToothSector {
+                joint: 1,
+                depth: 80.0 * arcsec,
+                centre: std::f64::consts::FRAC_PI_2,
+                half_width: std::f64::consts::PI,
+            },
+        ),
+        (
+            "creep_after_motion",
+            "joint = \"joint2\"\ncompliance_urad_per_nm = 10\ntime_constant_s = 60",
+            Effect::CreepAfterMotion { joint: 1, compliance: 10.0 / 1e6, time_constant: 60.0 },
+        ),
+        ("moment_crosstalk", "joint = \"joint2\"\ngain_urad_per_nm = -8", Effect::MomentCrosstalk { joint: 1, gain: -8.0 / 1e6 }),
+        (
+            "memory_hysteresis",
+            "joint = \"joint2\"\namplitude_arcsec = 30\ntravel_deg = 180",
+            Effect::MemoryHysteresis { joint: 1, amplitude: 30.0 * arcsec, travel: std::f64::consts::PI },
+        ),
+        ("wrong_payload", "excess_kg = 1\nstiffness_nm_per_rad = 2e4", Effect::WrongPayload { excess: 1.0, stiffness: 2e4 }),
+        (
+            "hardening_stiffness",
+            "joint = \"joint2\"\nstiffness_nm_per_rad = 2e4\ncubic_nm_per_mrad3 = 5",
+            Effect::HardeningStiffness { joint: 1, stiffness: 2e4, cubic: 5e9 },
+        ),
+    ];
+    assert_eq!(cases.each_ref().map(|case| case.0), KINDS.map(|kind| kind.kind));
+    for (kind, keys, expected) in cases {
+        let file =
+            with_effects(&format!("[[injected.effect]]\nkind = \"{kind}\"\n{keys}\n")).unwrap_or_else(|error| panic!("{error}"));
+        let effects = file.injected.clone().expect("injected").effects;
+        assert_eq!(effects, [expected], "{kind}");
+        assert!(kind == "clearance" || effects[0].name() == kind || kind == "tilt_clearance", "{kind}: {}", effects[0].name());
+        // Written and read again it is the same.
+        let text = file.injected_toml().expect("it can be written").expect("injected");
+        assert_eq!(parse_injected(&text, "truth", &file.scene.arm).unwrap_or_else(|error| panic!("{error}")).effects, effects);
+    }
+}
+
+#[test]
+fn wrong_effects_are_refused_with_line_key_and_remedy() {
+    for (table, expected) in [
+        ("kind = \"play\"", &["injected.effect[1].kind", "joint_compliance, link_bending", "kincal effects"][..]),
+        ("kind = \"backlsh\"", &["did you mean `backlash`?"]),
+        ("kind = \"backlash\"\nwidth_arcsec = 60", &["injected.effect[1].joint", "`joint` is missing"]),
+        ("kind = \"backlash\"\njoint = \"joint9\"\nwidth_arcsec = 60", &["injected.effect[1].joint", "joint1, joint2"]),
+        ("kind = \"backlash\"\njoint = \"joint3\"", &["`width_arcsec` is missing", "backlash needs width_arcsec"]),
+        ("kind = \"backlash\"\njoint = \"joint3\"\nwidth_arcsec = -6", &["injected.effect[1].width_arcsec", "more than 0"]),
+        ("kind = \"backlash\"\njoint = \"joint3\"\nwidth_arcsec = 6e4", &["2060 at most"]),
+        ("kind = \"backlash\"\njoint = \"joint3\"\nwidth_mm = 6", &["unknown key `width_mm`", "did you mean `width_arcsec`?"]),
+        (
+            "kind = \"backlash\"\njoint = \"joint3\"\nwidth_arcsec = 6\nphase_deg = 3",
+            &["injected.effect[1].phase_deg", "which backlash does not have", "kind, joint, width_arcsec"],
+        ),
+        (
+            "kind = \"joint_compliance\"\njoint = \"joint3\"\nstiffness_nm_per_rad = -2e4",
+            &["stiffness_nm_per_rad", "more than 0"],
+        ),
+        ("kind = \"radial_clearance\"\njoint = \"joint3\"\nradial_um = 3000", &["injected.effect[1].radial_um", "1000 at most"]),
+        ("kind = \"clearance\"\njoint = \"joint3\"", &["no magnitude", "at least one of radial_um, axial_um, tilt_urad"]),
+        ("kind = \"link_bending\"\nlink = \"link9\"\ncompliance_urad_per_nm = 3", &["injected.effect[1].link", "link1, link2"]),
+        (
+            "kind = \"joint_eccentricity\"\njoint = \"joint3\"\namplitude_arcsec = 3\norder = 3",
+            &["injected.effect[1].order", "1 or 2"],
+        ),
+        ("kind = \"gear_coupling\"\njoint = \"joint3\"\ncoupling_urad_per_rad = 3", &["`source` is missing"]),
+        ("kind = \"tool_step\"\ntranslation_um = [9, 9, 9]\nafter = 1.5", &["injected.effect[1].after", "1 at most"]),
+        ("kind = \"measurement_outliers\"\nshare = 2\nfactor = 5", &["injected.effect[1].share", "1 at most"]),
+        ("kind = \"base_step\"\ntranslation_um = [9, 9, 9]\nafter = 1\nmoves = \"arm\"", &["moves", "base", "sensor"]),
+        (
+            "kind = \"link_thermal_growth\"\nlink = \"link2\"\nexpansion_um_per_m_per_k = [1, 2]",
+            &["injected.effect[1].expansion_um_per_m_per_k", "one number where a link is named"],
+        ),
+    ] {
+        let message = match with_effects(&format!("[[injected.effect]]\n{table}\n")) {
+            Ok(_) => panic!("accepted: {table}"),
+            Err(error) => error.to_string(),
+        };
+        for fragment in expected.iter().chain(&["cell.toml:"]) {
+            assert!(message.contains(fragment), "{table}: {fragment:?} is not in\n{message}");
+        }
+    }
+    for (section, expected) in [
+        ("[injected.thermal]\nrise_k = 3\n", "[plan.temperature]"),
+        ("[[injected.clearance]]\njoint = \"joint2\"\n", "kind = \"clearance\""),
+    ] {
+        let message = with_effects(section).map(drop).unwrap_err().to_string();
+        assert!(message.contains("of an earlier version") && message.contains(expected), "{message}");
     }
 }

@@ -17,7 +17,7 @@ use rerun::external::re_sdk_types::blueprint::archetypes::{
 use rerun::external::re_sdk_types::datatypes::{Float32, Float64, Range1D, Range2D, Uuid};
 use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
 
-use super::{chart, picture};
+use super::{by_joint, chart, picture};
 use crate::report::criterion::Words;
 use crate::scene::Method;
 
@@ -162,13 +162,17 @@ fn legend_at(corner: Corner2D, name: &str, contents: &[&'static str], legend: bo
 }
 
 fn error_chart(name: &str, path: &'static str) -> Node {
-    let [x, y] = chart::BOUNDS;
+    drawing(name, path, chart::BOUNDS)
+}
+
+/// A drawing in a plane that fills `x` and `y` ranges.
+fn drawing(name: &str, path: &'static str, [x, y]: [[f64; 2]; 2]) -> Node {
     let bounds = VisualBounds2D(Range2D { x_range: Range1D(x), y_range: Range1D(y) });
     view("2D", name, &[path]).with("VisualBounds2D", VisualBounds::new(bounds))
 }
 
 /// The tree of views.
-fn tree(parts: Parts, camera: Camera) -> Node {
+fn tree(parts: Parts, camera: Camera, joints: usize) -> Node {
     let summary = view("TextDocument", "Summary", &["/summary"]);
     let notes = view("TextLog", "Notes", &["/notes/**"]);
     let mut cell = vec!["/world/base/**", "/world/cell/**", "/world/arm/**", "/world/arm_line/**", "/world/design/**"];
@@ -203,6 +207,8 @@ fn tree(parts: Parts, camera: Camera) -> Node {
         |words: Words| tabs(vec![plot(&capital(words.quantity()), &["/search/criterion/**"], true), effort("/search/effort/**")]);
     let position = error_chart("Position error", "/errors/position/**");
     let attitude = error_chart("Attitude error", "/errors/attitude/**");
+    let by_joint =
+        || drawing("What is left, joint by joint: came up (amber), down (blue)", "/errors/by_joint/**", by_joint::bounds(joints));
     let temperatures = plot("Temperatures, °C", &["/temperatures/**"], true);
     let side = tabs(vec![summary, notes]);
     match (parts.choosing, parts.measured) {
@@ -213,18 +219,18 @@ fn tree(parts: Parts, camera: Camera) -> Node {
         ]),
         (Choosing::Swarm(words), true) => columns(vec![
             (4.0, rows(vec![(10.0, cell), (5.0, indexes()), (4.0, fitness(words))])),
-            (4.0, rows(vec![(1.0, residuals()), (1.0, swarm())])),
+            (4.0, rows(vec![(1.0, residuals()), (1.0, tabs(vec![swarm(), by_joint()]))])),
             (3.0, rows(vec![(2.0, side), (1.0, tabs(vec![position, attitude, temperatures]))])),
         ]),
         (Choosing::Search(words), false) => columns(vec![(2.0, rows(vec![(3.0, cell), (2.0, search(words))])), (1.0, side)]),
         (Choosing::Search(words), true) => columns(vec![
             (4.0, rows(vec![(10.0, cell), (6.0, search(words))])),
-            (4.0, rows(vec![(10.0, residuals()), (6.0, tabs(vec![position, attitude]))])),
+            (4.0, rows(vec![(10.0, residuals()), (6.0, tabs(vec![by_joint(), position, attitude]))])),
             (3.0, rows(vec![(2.0, side), (1.0, temperatures)])),
         ]),
         (Choosing::Not, _) => {
             let scenes = columns(vec![(1.0, cell), (1.0, residuals())]);
-            let charts = columns(vec![(1.0, position), (1.0, attitude)]);
+            let charts = columns(vec![(3.0, by_joint()), (2.0, tabs(vec![position, attitude]))]);
             columns(vec![(8.0, rows(vec![(5.0, scenes), (3.0, charts)])), (3.0, rows(vec![(2.0, side), (1.0, temperatures)]))])
         }
     }
@@ -242,10 +248,11 @@ pub(super) fn send(
     application: &'static str,
     parts: Parts,
     camera: Camera,
+    joints: usize,
 ) -> RecordingStreamResult<()> {
     let (blueprint, storage) = RecordingStreamBuilder::new(application).enabled(true).blueprint().memory()?;
     blueprint.set_time_sequence("blueprint", 0);
-    let (_, root) = tree(parts, camera).log(&blueprint, &mut 0)?;
+    let (_, root) = tree(parts, camera, joints).log(&blueprint, &mut 0)?;
     let viewport =
         ViewportBlueprint::new().with_root_container(RootContainer(root)).with_auto_layout(false).with_auto_views(false);
     blueprint.log("viewport", &viewport)?;

@@ -8,6 +8,7 @@
 //! `chart` and `summary`, and `layout` (the blueprint).
 
 mod body;
+mod by_joint;
 mod chart;
 mod layout;
 mod picture;

@@ -16,6 +16,7 @@ use rerun::{
 use sha2::{Digest, Sha256};
 
 use super::body::{Body, point, transform};
+use super::by_joint;
 use super::chart::{self, Series, Unit};
 use super::layout::{self, Camera, Choosing, Parts};
 use super::summary::{Summary, significant};
@@ -66,6 +67,8 @@ pub(super) struct Picture {
     event: i64,
     best: Vec<Vec<f64>>,
     summary: Summary,
+    /// What was measured.
+    measurements: Vec<Measurement>,
     /// Measured minus nominal; what is measured minus identified is not known before the end.
     measured: Vec<Residual>,
     roles: BTreeMap<usize, Role>,
@@ -87,6 +90,7 @@ impl Picture {
             event: 0,
             best: Vec::new(),
             summary: Summary::default(),
+            measurements: Vec::new(),
             measured: Vec::new(),
             roles: BTreeMap::new(),
             series_named: false,
@@ -116,7 +120,7 @@ impl Picture {
         stream.set_log_tick_enabled(false);
         stream.send_recording_name(self.name.as_str())?;
         let parts = Parts::of(command, self.design);
-        layout::send(&stream, APPLICATION, parts, self.camera())?;
+        layout::send(&stream, APPLICATION, parts, self.camera(), self.body.arm().joint_count())?;
         stream.set_time_sequence(EVENTS, 0);
         if matches!(parts.choosing, Choosing::Search(_)) {
             // What stands still is there on the search's own timeline too.
@@ -326,6 +330,7 @@ impl Picture {
             self.catch_up(stream)?;
         }
         self.summary.measured(measurement);
+        self.measurements.push(measurement.clone());
         Ok(())
     }
 
@@ -349,6 +354,7 @@ impl Picture {
             self.log_scales(stream, &scales)?;
         }
         self.log_errors(stream, residuals, true)?;
+        by_joint::log(stream, "errors/by_joint", self.body.arm(), &self.measurements, residuals)?;
         self.stale = false;
         self.summary.identified(identified, &scales);
         Ok(())

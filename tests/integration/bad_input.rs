@@ -116,7 +116,7 @@ fn overrides_that_are_wrong() {
         ("design.swarm=5", "a table"),
         ("seed=9223372036854775808", ""),
         ("name=\"../elsewhere\"", "a-z 0-9"),
-        ("injected.clearance[1].radial_um=2000", "allowed: 1000 at most"),
+        ("injected.effect[1].radial_um=2000", "allowed: 1000 at most"),
     ] {
         refuse(&["run", "scenes/arm8.toml", "--set", "design.swarm.iterations=5", "--set", assignment], &[expected]);
     }
@@ -151,8 +151,8 @@ fn numbers_beyond_all_measure_are_refused_at_once() {
         "injected.parameters.length_mm=1e300",
         "injected.parameters.errors={a2_mm=1e300}",
         "injected.noise.factor=1e300",
-        "injected.thermal.rise_k=1e300",
-        "injected.thermal.rise_k=[0,0,0,0,0,0,0,0,1e300]",
+        "plan.temperature.rise_k=1e300",
+        "plan.temperature.rise_k=[0,0,0,0,0,0,0,0,1e300]",
     ] {
         let key = assignment.split('=').next().unwrap();
         let begun = std::time::Instant::now();

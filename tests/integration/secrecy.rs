@@ -20,9 +20,10 @@ fn what_is_injected_shows_in_the_measurements_only() {
         "injected.seed=732",
         "injected.parameters.length_mm=0.5",
         "injected.parameters.errors={a2_mm=0.25}",
-        "injected.clearance=[]",
+        "injected.effect=[]",
+        "injected.effect=[{kind=\"backlash\",joint=\"joint3\",width_arcsec=60}]",
         "injected.noise={kind=\"off\"}",
-        "injected.thermal.rise_k=3",
+        "injected.effect[4].expansion_um_per_m_per_k=5",
     ] {
         let other = quick_run(&["--set", set]);
         assert!(before_measuring(&other) == usual, "{set} shows before anything is measured");

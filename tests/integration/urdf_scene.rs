@@ -32,9 +32,10 @@ fn a_scene_with_a_urdf_runs_and_replays_without_the_file() {
     // Play and warming, too: the masses are the URDF's.
     let effects = [
         "--set",
-        "injected.clearance=[{joint=\"panda_joint2\",radial_um=30,tilt_urad=100},{joint=\"panda_joint4\",tilt_urad=100}]",
+        "injected.effect=[{kind=\"clearance\",joint=\"panda_joint2\",radial_um=30,tilt_urad=100},\
+         {kind=\"tilt_clearance\",joint=\"panda_joint4\",tilt_urad=100},{kind=\"link_thermal_growth\",expansion_um_per_m_per_k=23}]",
         "--set",
-        "injected.thermal={expansion_um_per_m_per_k=23,rise_k=10,profile=\"warm-up\"}",
+        "plan.temperature={rise_k=10,profile=\"warm-up\"}",
         "--json",
     ];
     let ran = with(&out, &["run", &scene], &[&QUICK[..], &effects].concat()).ends(0);

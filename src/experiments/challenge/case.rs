@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::folder::ChallengeError;
-use crate::cell::plan::{Planned, plan};
 use crate::cell::measure;
+use crate::cell::plan::{Planned, plan};
 use crate::design::candidates::{Rules, Sampler};
 use crate::design::search::split;
 use crate::effects::Location;
@@ -17,7 +17,7 @@ use crate::measurement::Measurement;
 use crate::recording::event::{Event, Listener, Nobody, Start};
 use crate::recording::write::Recorder;
 use crate::scene::effect::Effect;
-use crate::scene::{ApproachPolicy, Injected, Noise, SceneFile};
+use crate::scene::{Injected, Noise, SceneFile, Temperature};
 use crate::seed::{Stream, hidden_key, hidden_stream};
 use crate::session::{SessionError, start_event};
 
@@ -27,6 +27,8 @@ const PARAMETER_ERRORS: [f64; 2] = [1e-3, 0.2 * std::f64::consts::PI / 180.0];
 const TAILS: Tails = Tails { share: 0.05, factor: 5.0 };
 /// Noise that is larger than declared is so many times as large.
 const UNDERSTATED: f64 = 1.3;
+/// Course of the temperature.
+const COURSE: &str = "heat-and-cool";
 /// Payloads that take turns, kg.
 const PAYLOADS_KG: [f64; 2] = [0.0, 4.0];
 
@@ -172,15 +174,19 @@ pub fn public(base: &SceneFile, options: &Options, key: &[u8; 32], index: usize)
     Ok(Public { file, planned })
 }
 
-/// Random approach, heat and cool with a lag for each link, payloads that take turns, two readings of some configurations.
+/// Random approach, heat and cool with a lag for each link, payloads that take turns, two readings of some configurations: whatever
+/// the scene's own plan is.
 fn conditions(file: &mut SceneFile, options: &Options) -> Result<(), ChallengeError> {
     let session_s = options.poses as f64 * file.scene.plan.seconds_per_pose;
-    let temperature = course("heat-and-cool", &file.scene.arm, session_s);
-    let plan = &mut file.scene.plan;
-    plan.approach.policy = ApproachPolicy::Random;
-    plan.payloads_kg = PAYLOADS_KG.to_vec();
-    plan.repeats = if options.repeats > 0 { 2 } else { 1 };
-    plan.temperature = temperature;
+    file.set("plan.approach", "\"random\"")?;
+    file.set("plan.payloads_kg", &format!("{PAYLOADS_KG:?}"))?;
+    file.set("plan.payload_blocks", "false")?;
+    file.set("plan.repeats", if options.repeats > 0 { "2" } else { "1" })?;
+    if let Some(Temperature { rise_k, lag_s, ambient_rise_k, .. }) = course(COURSE, &file.scene.arm, session_s) {
+        let course =
+            format!("{{ profile = \"{COURSE}\", rise_k = {rise_k:?}, lag_s = {lag_s:?}, ambient_rise_k = {ambient_rise_k:?} }}");
+        file.set("plan.temperature", &course)?;
+    }
     Ok(())
 }
 
@@ -222,7 +228,8 @@ pub fn hidden(public: &Public, options: &Options, key: &[u8; 32], index: usize) 
             effects.push(effect);
         }
     }
-    let factor = if (options.heavy_tails..options.heavy_tails + options.understated).contains(&which) { UNDERSTATED } else { 1.0 };
+    let factor =
+        if (options.heavy_tails..options.heavy_tails + options.understated).contains(&which) { UNDERSTATED } else { 1.0 };
     let tails = (which < options.heavy_tails).then_some(TAILS);
     if let Some(Tails { share, factor }) = tails {
         effects.push(Effect::MeasurementOutliers { share, factor });
@@ -232,8 +239,6 @@ pub fn hidden(public: &Public, options: &Options, key: &[u8; 32], index: usize) 
         length_error_m: PARAMETER_ERRORS[0],
         angle_error_rad: PARAMETER_ERRORS[1],
         parameter_errors: Vec::new(),
-        clearances: Vec::new(),
-        thermal: None,
         effects,
         noise: Noise::Declared { factor },
     };
@@ -247,8 +252,7 @@ pub fn hidden(public: &Public, options: &Options, key: &[u8; 32], index: usize) 
 /// If the arm cannot be simulated.
 pub fn measured(public: &Public, hidden: &Hidden, index: usize) -> Result<(Vec<Measurement>, CaseTruth), ChallengeError> {
     let (scene, planned, injected) = (&public.file.scene, &public.planned, &hidden.injected);
-    let (measurements, truth) =
-        measure(scene, injected, planned, planned.len(), &mut Nobody).map_err(SessionError::from)?;
+    let (measurements, truth) = measure(scene, injected, planned, planned.len(), &mut Nobody).map_err(SessionError::from)?;
     let values: Vec<f64> = truth.parameters.iter().map(|parameter| parameter.true_value).collect();
     let mut effects: Vec<TrueEffect> = hidden
         .sorts
@@ -298,9 +302,11 @@ pub fn measured(public: &Public, hidden: &Hidden, index: usize) -> Result<(Vec<M
 /// # Errors
 /// If it cannot be written.
 pub fn write(folder: &Path, index: usize, public: &Public, measurements: &[Measurement]) -> Result<PathBuf, ChallengeError> {
-    let mut recorder = Recorder::create(folder, &name(index), &public.file.scene.arm)?;
+    let mut recorder = Recorder::create(folder, &name(index), &public.file.scene.arm)?.sources_only();
     let poses = Some(measurements.len());
-    recorder.take(&Event::Start(Start { poses, ..start_event("measure", &public.file.public_toml()?) })).map_err(SessionError::from)?;
+    recorder
+        .take(&Event::Start(Start { poses, ..start_event("measure", &public.file.public_toml()?) }))
+        .map_err(SessionError::from)?;
     for measurement in measurements {
         recorder.take(&Event::Measured(measurement.clone())).map_err(SessionError::from)?;
     }

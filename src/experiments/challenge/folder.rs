@@ -196,7 +196,8 @@ pub fn create(
         options: options.clone(),
         cases: truths,
     };
-    let text = serde_json::to_vec(&sealed).map_err(|error| ChallengeError::Altered { path: path.join(SEAL), reason: error.to_string() })?;
+    let text = serde_json::to_vec(&sealed)
+        .map_err(|error| ChallengeError::Altered { path: path.join(SEAL), reason: error.to_string() })?;
     let commitment = sha256(&text);
     let seal = [SEAL_MAGIC, &veiled(&text)].concat();
     let manifest = Manifest {

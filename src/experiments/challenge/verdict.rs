@@ -85,15 +85,22 @@ pub struct Unknown {
     pub present: bool,
 }
 
-/// Diagnoses a case; why it could not, in words, where it could not.
-pub type Diagnose = fn(&Case) -> Result<Verdict, String>;
+/// Diagnoses a case: what `kincal diagnose --json` prints, of which a [`Verdict`] is read; why it could not, in words, where it could
+/// not. Kinds in [`Case::withheld`] must not be used.
+pub type Diagnose = fn(&Case) -> Result<serde_json::Value, String>;
 
 /// The trivial baseline: nothing is ever wrong.
 ///
 /// # Errors
-/// Never.
-pub fn nothing(_: &Case) -> Result<Verdict, String> {
-    Ok(Verdict { verdict: "no_gap".to_owned(), effects: Vec::new(), confusion_sets: Vec::new(), unknown: Unknown::default() })
+/// None that a verdict could cause.
+pub fn nothing(_: &Case) -> Result<serde_json::Value, String> {
+    serde_json::to_value(nothing_at_all()).map_err(|error| error.to_string())
+}
+
+/// The verdict that nothing is wrong.
+#[must_use]
+pub fn nothing_at_all() -> Verdict {
+    Verdict { verdict: "no_gap".to_owned(), effects: Vec::new(), confusion_sets: Vec::new(), unknown: Unknown::default() }
 }
 
 /// What whoever knows the truth would say: every known effect at its place with its magnitude, and that the others are unknown.

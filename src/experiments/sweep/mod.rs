@@ -53,11 +53,17 @@ pub enum SweepError {
 /// A sweep that is ready: the cells with their chosen configurations.
 pub struct Sweep {
     cells: Vec<Ready>,
+    /// What every cell has.
     injected: Injected,
+    /// What the scene has.
+    whole: Injected,
     structure: Subspace,
     seed: u64,
     header: Header,
 }
+
+/// A scene with the configurations that were chosen for it.
+type Chosen = (Scene, Vec<Vec<f64>>);
 
 /// A cell with what is the same in all its trials.
 struct Ready {
@@ -76,7 +82,7 @@ impl Sweep {
     /// If a value of the grid does not fit the scene, or no configuration may be measured.
     pub fn new(file: &SceneFile, injected: &Injected, grid: &Grid, watcher: &dyn Watcher) -> Result<Sweep, SweepError> {
         let cells = grid.cells();
-        let mut sets: BTreeMap<(usize, Method), (Scene, Vec<Vec<f64>>)> = BTreeMap::new();
+        let mut sets: BTreeMap<(usize, Method), Chosen> = BTreeMap::new();
         let wanted: std::collections::BTreeSet<_> = cells.iter().map(|cell| (cell.poses, cell.method)).collect();
         watcher.begin("choosing", wanted.len());
         for (poses, method) in wanted {
@@ -103,11 +109,18 @@ impl Sweep {
         }
         let header = header(file, grid, &ready)?;
         let structure = Subspace::of_structure(arm, file.scene.sensor.attitude_sigma_rad.is_some());
-        let injected = match grid.background {
+        let background = match grid.background {
             Background::Scene => injected.clone(),
-            Background::Nothing => Injected { clearances: Vec::new(), thermal: None, effects: Vec::new(), ..injected.clone() },
+            Background::Nothing => Injected { effects: Vec::new(), ..injected.clone() },
         };
-        Ok(Sweep { cells: ready, injected, structure, seed: file.scene.seed, header })
+        let seed = file.scene.seed;
+        let sweep = Sweep { cells: ready, injected: background, whole: injected.clone(), structure, seed, header };
+        // What cannot be simulated is refused before hours are spent.
+        for ready in &sweep.cells {
+            let (_, injected) = sweep.injected_of(&ready.cell, &ready.scene);
+            measure::check(&ready.scene, &injected).map_err(measure::MeasureError::from).map_err(SessionError::from)?;
+        }
+        Ok(sweep)
     }
 
     /// What a file of results of this sweep begins with.
@@ -221,7 +234,6 @@ impl Sweep {
 
     /// What is injected without and with the cell's effect; without is absent where the cell has none of its own that could be seen.
     fn injected_of(&self, cell: &Cell, scene: &Scene) -> (Option<Injected>, Injected) {
-        let nothing = || Injected { clearances: Vec::new(), thermal: None, effects: Vec::new(), ..self.injected.clone() };
         match Sort::from_name(&cell.effect) {
             Some(sort) => {
                 let mut stream = truth::stream(&self.injected, scene.seed, "sweep/effect");
@@ -232,7 +244,7 @@ impl Sweep {
                 injected.effects.push(effect);
                 (seen.then(|| self.injected.clone()), injected)
             }
-            None if cell.effect == grid::AS_THE_SCENE => (Some(nothing()), self.injected.clone()),
+            None if cell.effect == grid::AS_THE_SCENE => (Some(self.injected.clone()), self.whole.clone()),
             None => (None, self.injected.clone()),
         }
     }
@@ -248,7 +260,7 @@ impl Sweep {
     ) -> Result<Vec<[f64; 6]>, SweepError> {
         let with = noiseless(scene, injected, planned).map_err(SessionError::from)?;
         // An arm without effects is its kinematics.
-        let plain = background.effects.is_empty() && background.clearances.is_empty() && background.thermal.is_none();
+        let plain = background.effects.is_empty();
         let without: Vec<Pose> = if plain {
             planned.iter().map(|planned| truly.forward(&planned.joints)).collect()
         } else {

@@ -1,0 +1,295 @@
+//! `kincal challenge`: blind cases, and the score of whoever diagnoses them.
+
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::{Context, bail, ensure};
+use rayon::prelude::*;
+use serde_json::json;
+
+use super::Outcome;
+use super::arguments::{Baseline, ChallengeCommand, Global, NewOptions, SceneOptions, ScoreOptions};
+use super::output;
+use super::reproduce::Progress;
+use crate::cell;
+use crate::effects::Kind;
+use crate::experiments::arms::arm8;
+use crate::experiments::bench::Watcher;
+use crate::experiments::challenge::folder::{self, COMMITMENT, MANIFEST, SEAL};
+use crate::experiments::challenge::verdict::{Diagnose, Verdict, nothing};
+use crate::experiments::challenge::{Folder, Options, case, score};
+use crate::experiments::injection::Sort;
+use crate::recording::truth_file::write_whole;
+use crate::report;
+
+/// What every command writes to if nobody says where.
+const USUAL_OUT: &str = "recordings";
+/// A seed below this can be found by trying.
+const GUESSABLE: u64 = 1 << 40;
+
+/// The diagnosis that finds nothing.
+const BASELINE: (&str, Diagnose) = ("the baseline that never finds anything", nothing);
+
+/// Kincal's own diagnosis with its name.
+fn diagnosis() -> Option<(&'static str, Diagnose)> {
+    Some(("kincal diagnose", diagnosed))
+}
+
+/// What `kincal diagnose` says of a case.
+fn diagnosed(case: &folder::Case) -> Result<Verdict, String> {
+    let scene = crate::scene::parse(&case.start.scene, &case.name).map_err(|error| error.to_string())?.scene;
+    let rows: Vec<_> = case.measurements.iter().collect();
+    let without = case.withheld.iter().filter_map(|name| Kind::from_name(name)).collect();
+    let options = crate::diagnosis::Options { noise: crate::diagnosis::outcome::NoiseSource::Declared, without };
+    let found = crate::diagnosis::diagnose(&scene.arm, &scene.sensor, &rows, &options).map_err(|error| error.to_string())?;
+    let json = serde_json::to_value(&found).map_err(|error| error.to_string())?;
+    serde_json::from_value(json).map_err(|error| error.to_string())
+}
+
+pub(crate) fn command(global: &Global, command: &ChallengeCommand) -> anyhow::Result<Outcome> {
+    match command {
+        ChallengeCommand::New(options) => new(global, options),
+        ChallengeCommand::Score(options) => scored(global, options),
+    }
+}
+
+fn new(global: &Global, options: &NewOptions) -> anyhow::Result<Outcome> {
+    let seed = global.seed.context(
+        "a challenge needs a seed that nobody guesses: --seed N, such as that of `od -An -N8 -tu8 /dev/urandom`; the same seed makes \
+         the same challenge again",
+    )?;
+    let cases = Options {
+        cases: options.cases,
+        kinds: kinds(&options.kinds, &options.withheld)?,
+        effects: effects(&options.effects)?,
+        base_rate: options.base_rate.map(|rate| share(rate, "base-rate")).transpose()?,
+        noise_m: noise(&options.noise)?,
+        heavy_tails: share(options.heavy_tails, "heavy-tails")?,
+        understated: share(options.understated, "understated")?,
+        poses: options.poses,
+        repeats: options.repeats.unwrap_or(options.poses / 6),
+        withheld: withheld(&options.withheld)?,
+    };
+    ensure!((1..=9999).contains(&cases.cases), "--cases {}: 1 to 9999", cases.cases);
+    ensure!(
+        cases.heavy_tails + cases.understated <= 1.0,
+        "--heavy-tails and --understated are shares of all cases: together 1 at most"
+    );
+    ensure!(
+        cases.poses <= 10_000 && 2 * cases.repeats <= cases.poses,
+        "--poses {} --repeats {}: 10000 readings at most, of which half at most repeat another",
+        cases.poses,
+        cases.repeats
+    );
+    let base = match &options.scene {
+        Some(scene) => output::scene(
+            &Global { seed: None, ..global.clone() },
+            &SceneOptions { scene: scene.clone(), set: options.set.clone() },
+        )?,
+        None => {
+            let mut file = arm8()?;
+            for assignment in &options.set {
+                output::assign(&mut file, assignment)?;
+            }
+            file
+        }
+    };
+    let path = if global.out == Path::new(USUAL_OUT) { global.out.join("challenge") } else { global.out.clone() };
+    // What is wrong with the scene is said before anything is written.
+    let key = case::key(seed);
+    let public = case::public(&base, &cases, &key, 0)?;
+    cell::measure::check(&public.file.scene, &case::hidden(&public, &cases, &key, 0).injected)?;
+    if seed < GUESSABLE {
+        output::note(
+            global,
+            "note: whoever tries all small seeds finds this one, and with it the truth; take one of 19 digits where it matters",
+        );
+    }
+    if cases.repeats == 0 {
+        output::note(global, "note: no configuration is read twice: the noise cannot be estimated from repeats");
+    }
+    let progress = Progress::new(global);
+    let start = Instant::now();
+    let manifest = folder::create(&path, &base, &cases, seed, &progress)?;
+    progress.end();
+    output::note(global, &format!("{:.1} s", start.elapsed().as_secs_f64()));
+    output::show(
+        global,
+        &format!(
+            "{} cases in {}: {} … {}\nManifest    {}\nTruth       {} (sealed: do not open it before the diagnosis is made)\n\
+             Commitment  {} (SHA-256 of the truth; also in {COMMITMENT})",
+            manifest.cases.len(),
+            path.display(),
+            manifest.cases[0].file,
+            manifest.cases[manifest.cases.len() - 1].file,
+            path.join(MANIFEST).display(),
+            path.join(SEAL).display(),
+            manifest.commitment
+        ),
+    )?;
+    output::show_json(
+        global,
+        &json!({ "folder": path, "cases": manifest.cases.len(), "commitment": manifest.commitment, "seal": path.join(SEAL) }),
+    )?;
+    Ok(Outcome::Good)
+}
+
+/// Names of effects to draw from: `known`, `foreign`, `all`, or kinds. Withheld ones are drawn as well.
+fn kinds(given: &[String], withheld: &[String]) -> anyhow::Result<Vec<String>> {
+    let mut sorts: Vec<Sort> = Vec::new();
+    let known = || Kind::ALL.into_iter().map(Sort::Known);
+    for name in given {
+        match name.as_str() {
+            "known" => sorts.extend(known()),
+            "foreign" => sorts.extend(Sort::FOREIGN),
+            "all" => sorts.extend(Sort::all()),
+            name => sorts.push(Sort::from_name(name).with_context(|| {
+                let all: Vec<&str> = Sort::all().into_iter().map(Sort::name).collect();
+                format!("--kinds {name}: no such kind; there are known, foreign, all, {}", all.join(", "))
+            })?),
+        }
+    }
+    if given.is_empty() {
+        sorts.extend(known());
+    }
+    sorts.extend(withheld.iter().filter_map(|name| Sort::from_name(name)));
+    sorts.sort_unstable();
+    sorts.dedup();
+    Ok(sorts.into_iter().map(|sort| sort.name().to_owned()).collect())
+}
+
+fn withheld(given: &[String]) -> anyhow::Result<Vec<String>> {
+    for name in given {
+        ensure!(
+            Kind::from_name(name).is_some(),
+            "--withheld {name}: no such kind; there are {}",
+            Kind::ALL.map(Kind::name).join(", ")
+        );
+    }
+    Ok(given.to_vec())
+}
+
+/// `2` or `0..3`, both ends included.
+fn effects(text: &str) -> anyhow::Result<[usize; 2]> {
+    let number = |text: &str| text.trim().trim_start_matches('=').parse::<usize>().ok().filter(|number| *number <= 8);
+    let range = match text.split_once("..") {
+        Some((from, to)) => number(from).zip(number(to)),
+        None => number(text).map(|number| (number, number)),
+    };
+    match range {
+        Some((from, to)) if from <= to => Ok([from, to]),
+        _ => bail!("--effects {text}: a number of effects such as 1, or fewest and most such as 0..3 (both included, 8 at most)"),
+    }
+}
+
+fn noise(given: &[f64]) -> anyhow::Result<Vec<f64>> {
+    for noise in given {
+        ensure!((0.1..=10_000.0).contains(noise), "--noise {noise}: one sigma per axis in µm, 0.1 to 10000");
+    }
+    Ok(given.iter().map(|noise| noise * 1e-6).collect())
+}
+
+fn share(value: f64, name: &str) -> anyhow::Result<f64> {
+    ensure!((0.0..=1.0).contains(&value), "--{name} {value}: a share of the cases, 0 to 1");
+    Ok(value)
+}
+
+fn scored(global: &Global, options: &ScoreOptions) -> anyhow::Result<Outcome> {
+    let folder = Folder::open(&options.folder)?;
+    let count = folder.manifest.cases.len();
+    let mut seconds = Vec::new();
+    let (who, verdicts): (String, Vec<Verdict>) = match &options.verdicts {
+        Some(verdicts) => {
+            let read = |case: &folder::ManifestCase| {
+                let path = verdicts.join(case.file.replace(".mcap", ".json"));
+                let text = std::fs::read(&path).with_context(|| {
+                    format!(
+                        "cannot read {}; --verdicts takes a folder with the verdict of every case as case-0001.json …",
+                        path.display()
+                    )
+                })?;
+                serde_json::from_slice(&text).with_context(|| format!("{} is no verdict", path.display()))
+            };
+            let all = folder.manifest.cases.iter().map(read).collect::<anyhow::Result<_>>()?;
+            (verdicts.display().to_string(), all)
+        }
+        None => {
+            let (who, diagnose) = match (options.baseline, diagnosis()) {
+                (Some(Baseline::None), _) => BASELINE,
+                (None, Some(diagnosis)) => diagnosis,
+                (None, None) => {
+                    output::note(global, "note: kincal has no diagnosis yet: a trivial baseline is scored");
+                    BASELINE
+                }
+            };
+            let progress = Progress::new(global);
+            progress.begin("diagnosing", count);
+            let diagnosed: Vec<(serde_json::Value, f64)> = (0..count)
+                .into_par_iter()
+                .map(|index| {
+                    let case = folder.case(index)?;
+                    let start = Instant::now();
+                    let verdict = diagnose(&case).map_err(|why| anyhow::anyhow!("{}: {why}", case.path.display()))?;
+                    progress.step();
+                    Ok((verdict, start.elapsed().as_secs_f64()))
+                })
+                .collect::<anyhow::Result<_>>()?;
+            progress.end();
+            // Before the seal is opened.
+            for (case, (verdict, _)) in folder.manifest.cases.iter().zip(&diagnosed) {
+                let path = folder.path.join("verdicts").join(case.file.replace(".mcap", ".json"));
+                output::write(&path, &format!("{}\n", serde_json::to_string_pretty(verdict)?))?;
+            }
+            seconds = diagnosed.iter().map(|(_, seconds)| *seconds).collect();
+            let read = |(verdict, _)| serde_json::from_value(verdict).context("the diagnosis is no verdict");
+            (who.to_owned(), diagnosed.into_iter().map(read).collect::<anyhow::Result<_>>()?)
+        }
+    };
+    let sealed = folder.unseal()?;
+    let score = score(&sealed.cases, &verdicts, &folder.manifest.withheld);
+    let text = report::challenge::score(&score, &who, &seconds);
+    let figure = report::challenge::figure(&score);
+    let mut written = Vec::new();
+    let mut put = |name: &str, bytes: &[u8]| -> anyhow::Result<()> {
+        let path = folder.path.join(name);
+        write_whole(&path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
+        written.push(path);
+        Ok(())
+    };
+    put("score.json", format!("{}\n", serde_json::to_string_pretty(&score)?).as_bytes())?;
+    put("score-confusion.csv", &report::challenge::confusion(&score.confusion)?)?;
+    put("score.svg", figure.svg()?.as_bytes())?;
+    put("score.png", &figure.png()?)?;
+    output::show(global, &format!("Commitment  {} (the truth is what was committed to)\n\n{text}", folder.manifest.commitment))?;
+    let names: Vec<_> = written.iter().filter_map(|path| path.file_name()).map(|name| name.to_string_lossy()).collect();
+    output::show(global, &format!("Written to {}: {}", folder.path.display(), names.join(", ")))?;
+    output::show_json(
+        global,
+        &json!({ "commitment": folder.manifest.commitment, "diagnosed_by": who, "score": score, "seconds": seconds, "files": written }),
+    )?;
+    Ok(Outcome::Good)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_effects_include_both_ends() {
+        assert_eq!(effects("1").unwrap(), [1, 1]);
+        assert_eq!(effects("0..3").unwrap(), [0, 3]);
+        assert_eq!(effects("0..=3").unwrap(), [0, 3]);
+        for wrong in ["", "3..1", "-1", "9", "a..b"] {
+            assert!(effects(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn withheld_kinds_are_drawn_too() {
+        let names = |given: &[&str]| given.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+        assert_eq!(kinds(&names(&["backlash"]), &names(&["tool_step"])).unwrap(), ["backlash", "tool_step"]);
+        assert_eq!(kinds(&[], &[]).unwrap().len(), 16);
+        assert_eq!(kinds(&names(&["all"]), &[]).unwrap().len(), 22);
+        assert!(kinds(&names(&["rust"]), &[]).is_err() && withheld(&names(&["worn_tooth_sector"])).is_err());
+    }
+}

@@ -1,0 +1,167 @@
+//! The score of a diagnosis: tables for people, one for CSV, and the reliability plot.
+
+use super::table;
+use crate::experiments::challenge::score::{Confusion, Score, Single};
+use crate::figure::{Axis, Colour, Estimate, Figure, Kind, Panel, Series};
+
+/// `97 % (31/32)`.
+fn share(part: usize, of: usize) -> String {
+    if of == 0 { "–".to_owned() } else { format!("{:.1} % ({part}/{of})", 100.0 * part as f64 / of as f64) }
+}
+
+fn percent(value: Option<f64>) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| format!("{:.1} %", 100.0 * value))
+}
+
+fn single(name: String, row: &Single) -> Vec<String> {
+    vec![
+        name,
+        row.cases.to_string(),
+        share(row.right, row.cases),
+        share(row.right_place, row.right),
+        share(row.abstained, row.cases),
+        row.in_a_set.to_string(),
+        share(row.wrong, row.cases),
+        share(row.confidently_wrong, row.cases),
+        row.unknown.to_string(),
+    ]
+}
+
+const SINGLE: [&str; 9] =
+    ["one effect, by λ", "cases", "right kind", "right place", "abstained", "in a set", "wrong kind", "confidently", "unknown"];
+
+/// All tables. `seconds` are the times of the diagnosis, case by case; empty where it was made elsewhere.
+#[must_use]
+pub fn score(score: &Score, who: &str, seconds: &[f64]) -> String {
+    let mut text = format!("{} cases, diagnosed by {who}\n", score.cases);
+    text.push_str(&table(&SINGLE, score.single.iter().map(|row| single(row.lambda.clone(), row)).collect()));
+    text.push('\n');
+    let kinds = score.by_kind.iter().map(|kind| {
+        let (all, visible) = (&kind.all, &kind.visible);
+        let named = |row: &&Confusion| row.truth == kind.kind && row.lambda == visible.lambda && row.named != kind.kind;
+        let instead: Vec<String> =
+            score.confusion.iter().filter(named).map(|row| format!("{} {}", row.cases, row.named)).collect();
+        vec![
+            kind.kind.clone(),
+            all.cases.to_string(),
+            share(all.right, all.cases),
+            share(all.wrong, all.cases),
+            visible.cases.to_string(),
+            share(visible.right, visible.cases),
+            share(visible.right_place, visible.right),
+            if instead.is_empty() { "–".to_owned() } else { instead.join(", ") },
+        ]
+    });
+    if !score.by_kind.is_empty() {
+        let header = [
+            "one effect, by kind",
+            "cases",
+            "right kind",
+            "wrong kind",
+            "λ ≥ 40",
+            "right kind",
+            "right place",
+            "there named instead",
+        ];
+        text.push_str(&table(&header, kinds.collect()));
+        text.push('\n');
+    }
+    let several = &score.several;
+    text.push_str(&table(
+        &["several effects", "cases", "exact set", "found (recall)", "right among named (precision)"],
+        vec![
+            vec![
+                "all".to_owned(),
+                several.cases.to_string(),
+                share(several.exact, several.cases),
+                share(several.found, several.effects),
+                share(several.named_right, several.named),
+            ],
+            vec![
+                "each λ ≥ 40".to_owned(),
+                several.visible_cases.to_string(),
+                share(several.visible_exact, several.visible_cases),
+                share(several.visible_found, several.visible_effects),
+                "–".to_owned(),
+            ],
+        ],
+    ));
+    text.push('\n');
+    let free = score
+        .effect_free
+        .iter()
+        .map(|row| vec![row.noise.clone(), row.cases.to_string(), share(row.named, row.cases), share(row.unknown, row.cases)]);
+    text.push_str(&table(&["no effect, noise", "cases", "false alarm", "called unknown"], free.collect()));
+    text.push('\n');
+    let foreign = score.foreign.iter().map(|row| {
+        vec![row.lambda.clone(), row.cases.to_string(), share(row.flagged, row.cases), share(row.misnamed, row.cases)]
+    });
+    text.push_str(&table(&["kind not to be known", "cases", "flagged unknown", "misnamed"], foreign.collect()));
+    text.push('\n');
+    let sizes = score
+        .magnitudes
+        .iter()
+        .map(|row| vec![row.lambda.clone(), row.given.to_string(), percent(row.median_error), share(row.covered, row.intervals)]);
+    text.push_str(&table(&["magnitude, found effects", "given", "median error", "95 % intervals cover"], sizes.collect()));
+    let calibration = &score.calibration;
+    let number = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| format!("{value:.3}"));
+    text.push_str(&format!(
+        "\nProbabilities: {} statements, ECE {}, Brier {}.\n",
+        calibration.statements,
+        number(calibration.ece),
+        number(calibration.brier)
+    ));
+    if !seconds.is_empty() {
+        let mut sorted = seconds.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        text.push_str(&format!(
+            "Time per case: {:.4} s median, {:.4} s at most (cases side by side on all threads).\n",
+            sorted[sorted.len() / 2],
+            sorted[sorted.len() - 1]
+        ));
+    }
+    text.push_str(
+        "λ: what geometry leaves of the effect, in squared sigmas of the declared noise. Named: probability of a half or more; \
+         confidently: 0.95 or more. Right place: of those with the right kind. Shares are of the cases of their row.\n",
+    );
+    text
+}
+
+/// Which kind was named for which, for CSV.
+///
+/// # Errors
+/// None that a text could cause.
+pub fn confusion(rows: &[Confusion]) -> Result<Vec<u8>, csv::Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        writer.serialize(row)?;
+    }
+    writer.into_inner().map_err(|error| error.into_error().into())
+}
+
+/// Stated probability against the share that is true, with how often each was stated; and what is right by λ.
+#[must_use]
+pub fn figure(score: &Score) -> Figure {
+    let calibration = &score.calibration;
+    // Wilson's interval of the share.
+    let points = calibration.reliability.iter().map(|bin| {
+        let (n, p, z) = (bin.statements as f64, bin.true_share, 1.96);
+        let middle = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
+        let half = z * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt() / (1.0 + z * z / n);
+        Estimate { x: bin.stated, y: p, x_interval: None, y_interval: Some([middle - half, middle + half]) }
+    });
+    let reliability =
+        Panel::new(Axis::linear("stated probability").range(0.0, 1.0), Axis::linear("share that is true").range(0.0, 1.0))
+            .titled("Reliability of the probabilities")
+            .with(Series::new("", Kind::Diagonal).colour(Colour::Dark))
+            .with(Series::new("with 95 % intervals", Kind::Estimates(points.collect())));
+    let rows: Vec<&Single> = score.single.iter().filter(|row| row.cases > 0).collect();
+    let shares = |get: &dyn Fn(&Single) -> usize| rows.iter().map(|row| 100.0 * get(row) as f64 / row.cases as f64).collect();
+    let names = rows.iter().map(|row| format!("{} ({})", row.lambda, row.cases));
+    let right = Panel::new(Axis::categories("λ (cases)", names), Axis::linear("cases (%)").range(0.0, 100.0))
+        .titled("One effect")
+        .with(Series::new("right kind", Kind::Bars(shares(&|row| row.right))))
+        .with(Series::new("abstained", Kind::Bars(shares(&|row| row.abstained))))
+        .with(Series::new("wrong kind", Kind::Bars(shares(&|row| row.wrong))));
+    Figure::new("Score of the diagnosis", 2).with(reliability).with(right)
+}
