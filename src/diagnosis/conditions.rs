@@ -4,11 +4,11 @@ use nalgebra::Vector3;
 
 use super::rows::Rows;
 use crate::effects::signature::library::Columns;
-use crate::effects::signature::shape::{MEMORIES, Reading};
+use crate::effects::signature::shape::{FORGETTING_S, MEMORIES, Reading};
 use crate::measurement::Measurement;
 
 /// Change points tried at most.
-const CHANGES: usize = 40;
+const CHANGES: usize = 80;
 
 /// Rows as signatures see them, and what the data have.
 #[derive(Clone, Debug)]
@@ -104,8 +104,8 @@ pub fn conditions(measurements: &[&Measurement], rows: &Rows) -> Conditions {
             foot_rise_k,
             share: if time { (measurement.time_s - begin) / (end - begin) } else { 0.0 },
             order: order[row],
-            torque_before: vec![0.0; count],
-            way: vec![0.0; count],
+            torque_memory: vec![[0.0; FORGETTING_S.len()]; count],
+            gravity: rows.mechanism.gravity,
             memory: vec![[0.0; MEMORIES.len()]; count],
         });
     }
@@ -114,11 +114,15 @@ pub fn conditions(measurements: &[&Measurement], rows: &Rows) -> Conditions {
     for place in 0..total {
         let row = in_time[place];
         if let Some(before) = place.checked_sub(1).map(|before| in_time[before]) {
+            let pause = measurements[row].time_s - measurements[before].time_s;
             for joint in 0..count {
-                let torque = readings[before].posture.torque(joint);
-                readings[row].torque_before[joint] = torque;
+                let torque = readings[row].posture.torque(joint);
+                for (which, time) in FORGETTING_S.iter().enumerate() {
+                    let kept = libm::exp(-pause.max(0.0) / time);
+                    readings[row].torque_memory[joint][which] =
+                        readings[before].torque_memory[joint][which] * kept + torque * (1.0 - kept);
+                }
                 let way = readings[row].joints[joint] - readings[before].joints[joint];
-                readings[row].way[joint] = way;
                 // Where the last move's direction is known it may not be that of the whole way.
                 let sign = if way == 0.0 { 0.0 } else { way.signum() };
                 for (memory, length) in memory[joint].iter_mut().zip(MEMORIES) {
@@ -129,7 +133,7 @@ pub fn conditions(measurements: &[&Measurement], rows: &Rows) -> Conditions {
             }
         } else {
             for joint in 0..count {
-                readings[row].torque_before[joint] = readings[row].posture.torque(joint);
+                readings[row].torque_memory[joint] = [readings[row].posture.torque(joint); FORGETTING_S.len()];
             }
         }
     }

@@ -75,8 +75,8 @@ impl Candidates {
         match (a.kind, b.kind) {
             (Some(x), Some(y)) => x == y && a.location == b.location && !matches!(x, Kind::StrainWaveError | Kind::GearCoupling),
             // A cubic spring has the linear one in it.
-            (Some(Kind::JointCompliance), None) | (None, Some(Kind::JointCompliance)) => {
-                a.location == b.location && (is_hardening(a) || is_hardening(b))
+            (Some(Kind::JointCompliance), None) | (None, Some(Kind::JointCompliance)) | (None, None) => {
+                a.location == b.location && (is_hardening(a) || is_hardening(b)) && (a.kind != b.kind || is_hardening(a) == is_hardening(b))
             }
             _ => false,
         }
@@ -84,7 +84,8 @@ impl Candidates {
 }
 
 fn is_hardening(hypothesis: &Hypothesis) -> bool {
-    matches!(hypothesis.shape, crate::effects::signature::shape::Shape::Hardening(_))
+    use crate::effects::signature::shape::Shape;
+    matches!(hypothesis.shape, Shape::Hardening(_) | Shape::Softening(_))
 }
 
 /// Whether physics allows only one sign.

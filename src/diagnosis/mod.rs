@@ -33,6 +33,8 @@ use rows::{DiagnosisError, Rows};
 pub const FOLDS: usize = 5;
 /// Prior odds of one effect more.
 const ODDS: f64 = 0.5;
+/// Rounds of weighting outliers down.
+const PASSES: usize = 4;
 /// Share of the prior of shapes without a name.
 const NAMELESS: f64 = 0.25;
 /// λ at the upper end of the realistic range below which a hypothesis has no information in the data.
@@ -104,8 +106,8 @@ pub fn diagnose(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], optio
     let all = vec![true; geometry];
     let mut weights = vec![1.0; total];
     let mut result = None;
-    // Readings that are far off are weighted down, first by what geometry leaves, then by what the best model leaves.
-    for pass in 0..3 {
+    // Readings that are far off from the best model are weighted down, until it stays the same.
+    for pass in 0..PASSES {
         let mut whitening = rows.whitening.clone();
         for (row, weight) in weights.iter().enumerate() {
             whitening.rows_mut(row * rows.per_row, rows.per_row).scale_mut(libm::sqrt(*weight));
@@ -118,11 +120,7 @@ pub fn diagnose(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], optio
         let lost = rows.per_row as f64 * weights.iter().map(|weight| 1.0 - weight).sum::<f64>();
         surviving.freedom = (surviving.freedom - lost).max(1.0);
         weigh(&mut candidates, &surviving);
-        let found = if pass == 0 {
-            search::search(&surviving, &candidates, noise, 0)
-        } else {
-            search::search(&surviving, &candidates, noise, search::MOST)
-        };
+        let found = search::search(&surviving, &candidates, noise, search::MOST);
         let residual = residual(&raw, &surviving, &candidates, noise, &found.best.members, geometry);
         let squares: Vec<f64> = (0..total)
             .map(|row| {
@@ -130,9 +128,9 @@ pub fn diagnose(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], optio
                 residual.rows(first, count).component_mul(&rows.whitening.rows(first, count)).norm_squared()
             })
             .collect();
-        let next = outliers::weights(&squares, rows.per_row, if pass == 0 { 2.0 } else { 1.0 });
+        let next = outliers::weights(&squares, rows.per_row);
         let same = next.iter().zip(&weights).all(|(a, b)| (a - b).abs() < 1e-3);
-        let last = pass == 2 || (pass > 0 && same);
+        let last = pass + 1 == PASSES || same;
         if last {
             result = Some((grams, whitening, surviving, found, residual, squares));
             break;
@@ -255,12 +253,13 @@ fn class(hypothesis: &Hypothesis) -> (Option<Kind>, u8) {
         _ if hypothesis.kind.is_some() => 0,
         Shape::Harmonic(..) => 1,
         Shape::Bump { .. } => 2,
-        Shape::Crosstalk(_) => 3,
-        Shape::Hardening(_) => 4,
-        Shape::TorqueBefore(_) => 5,
+        Shape::Crosstalk { .. } => 3,
+        Shape::Softening(_) | Shape::Hardening(_) => 4,
+        Shape::TorqueMemory(..) => 5,
         Shape::DirectionLoad(_) => 6,
         Shape::Memory(..) => 7,
-        _ => 8,
+        Shape::AllYield => 8,
+        _ => 9,
     };
     (hypothesis.kind, shape)
 }

@@ -31,10 +31,10 @@ fn level(squares: &[f64], per_row: usize) -> f64 {
     (sorted[sorted.len() / 2] / MEDIAN[which(per_row)]).max(1e-12)
 }
 
-/// Weights of readings with these squared residuals (Huber's, on the squares): one for all but rare ones. `slack` makes them rarer.
+/// Weights of readings with these squared residuals (Huber's, on the squares): one for all but rare ones.
 #[must_use]
-pub fn weights(squares: &[f64], per_row: usize, slack: f64) -> Vec<f64> {
-    let limit = RARE[which(per_row)] * slack * level(squares, per_row);
+pub fn weights(squares: &[f64], per_row: usize) -> Vec<f64> {
+    let limit = RARE[which(per_row)] * level(squares, per_row);
     // Twice as far off counts a quarter, then less and less: an outlier tells nothing.
     squares.iter().map(|square| if *square <= limit { 1.0 } else { (limit / square) * (limit / square) }).collect()
 }

@@ -19,6 +19,8 @@ const SURE: f64 = 0.95;
 const WORTH_SAYING: f64 = 0.03;
 /// Of the residual having no structure: below this there is some.
 const STRUCTURED: f64 = 0.003;
+/// Mean square of the residual, over that of the noise that is known, from which on something is left.
+const EXCESS: f64 = 2.4;
 /// Of the kinds and places, so many must be detectable at a realistic magnitude for "no gap".
 const ENOUGH: f64 = 0.5;
 
@@ -146,22 +148,47 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
     });
     let gap = Gap { nominal_rms_m, geometry_rms_m, explained_rms_m, noise_rms_m: noise_rms, gap_closed, gap_closed_ci95, folds: analysis.folds.len() };
 
+    let best = fit(analysis.surviving, analysis.candidates, analysis.noise, &analysis.found.best.members);
+    let level = best.map_or(1.0, |fit| fit.noise);
+    // What is unknown.
+    let of_nameless = probability(analysis, |hypothesis| analysis.candidates.hypotheses[hypothesis].kind.is_none());
+    let p_value = analysis.structure.p_value;
+    let structured = p_value < STRUCTURED;
+    // A sensor may be somewhat worse than it says, not this much.
+    let known = !matches!(source, NoiseSource::Assumed);
+    let excess = known && level > EXCESS * (position_m / declared) * (position_m / declared);
+    let present = of_nameless >= NAMED || structured || excess;
+    let unknown_members: Vec<usize> = analysis.found.best.members.iter().map(|(hypothesis, _)| *hypothesis).filter(|hypothesis| analysis.candidates.hypotheses[*hypothesis].kind.is_none()).collect();
+    let r#where = present.then(|| {
+        let mut said: Vec<String> =
+            unknown_members.iter().map(|hypothesis| analysis.candidates.hypotheses[*hypothesis].detail.clone()).collect();
+        if structured {
+            said.push(analysis.structure.r#where.clone());
+        }
+        if said.is_empty() {
+            said.push(format!("what remains is {:.1} times the {} noise", libm::sqrt(level), word(source)));
+        }
+        said.join("; ")
+    });
+    let unknown = Unknown { present, p_value: p_value.min(1.0 - of_nameless).max(0.0), r#where };
+
     // Named effects.
     let mut effects = Vec::new();
-    let mut unknown_members = Vec::new();
     for (step, (hypothesis, _)) in analysis.found.best.members.iter().enumerate() {
         let this = claim(analysis, *hypothesis);
         let of = &analysis.candidates.hypotheses[*hypothesis];
         if of.kind.is_none() {
-            unknown_members.push(*hypothesis);
             continue;
         }
         let probability = probability(analysis, |other| claim(analysis, other) == this);
-        let Some(magnitude) = magnitude(analysis, *hypothesis).filter(|_| probability >= NAMED) else {
+        let chosen = analysis.folds.iter().filter(|fold| fold.chosen.iter().any(|other| claim(analysis, *other) == this)).count();
+        // Beside something unknown a name may only stand in for it: it must be sure, and the same whatever is left out.
+        let needed = if present { SURE } else { NAMED };
+        let stable = !present || 5 * chosen >= 4 * analysis.folds.len();
+        let Some(magnitude) = magnitude(analysis, *hypothesis).filter(|_| probability >= needed && stable) else {
             continue;
         };
         let (before, now) = (after(step), after(step + 1));
-        let chosen = analysis.folds.iter().filter(|fold| fold.chosen.iter().any(|other| claim(analysis, *other) == this)).count();
         effects.push(Effect {
             kind: kind_name(of.kind),
             location: place(analysis, *hypothesis),
@@ -176,7 +203,9 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
     }
     let outliers = &analysis.outliers;
     let is_left_out = analysis.options.without.contains(&Kind::MeasurementOutliers);
-    if outliers.probability >= NAMED && !is_left_out {
+    // A misfit has tails, too.
+    let enough = if present { 9.0 } else { 4.0 };
+    if outliers.probability >= NAMED && outliers.factor >= enough && !is_left_out {
         effects.push(Effect {
             kind: Kind::MeasurementOutliers.name().to_owned(),
             location: Place { level: Level::Sensor, index: None, time_s: None },
@@ -198,24 +227,7 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
 
     let confusion_sets = confusion(analysis);
 
-    // What is unknown.
-    let of_nameless = probability(analysis, |hypothesis| analysis.candidates.hypotheses[hypothesis].kind.is_none());
-    let p_value = analysis.structure.p_value;
-    let structured = p_value < STRUCTURED;
-    let present = of_nameless >= NAMED || structured;
-    let r#where = present.then(|| {
-        let mut said: Vec<String> =
-            unknown_members.iter().map(|hypothesis| analysis.candidates.hypotheses[*hypothesis].detail.clone()).collect();
-        if structured {
-            said.push(analysis.structure.r#where.clone());
-        }
-        said.join("; ")
-    });
-    let unknown = Unknown { present, p_value: p_value.min(1.0 - of_nameless).max(0.0), r#where };
-
     // Power.
-    let best = fit(analysis.surviving, analysis.candidates, analysis.noise, &analysis.found.best.members);
-    let level = best.map_or(1.0, |fit| fit.noise);
     if level > 2.25 || level < 0.44 {
         notes.push(format!("the residuals are {:.2} times the {} noise", libm::sqrt(level), word(source)));
     }

@@ -1,7 +1,7 @@
 //! What is looked for: every kind at every place, and shapes that have no name.
 
 use super::posture::Mechanism;
-use super::shape::{MEMORIES, Shape};
+use super::shape::{FORGETTING_S, MEMORIES, Shape};
 use crate::effects::{Kind, Location};
 
 /// One second of arc, rad.
@@ -111,6 +111,14 @@ pub fn library(mechanism: &Mechanism, columns: &Columns) -> Vec<Hypothesis> {
         all.push(Hypothesis { spread: twist.clone(), ..simple(Kind::BaseStep, None, Shape::BaseStep(*row), [15e-6, 80e-6]) });
         all.push(Hypothesis { spread: tool.clone(), ..simple(Kind::ToolStep, None, Shape::ToolStep(*row), [0.05e-3, 0.5e-3]) });
     }
+    all.push(Hypothesis {
+        kind: None,
+        location: Location { level: crate::effects::Level::Tool, index: None },
+        shape: Shape::AllYield,
+        range: [2e-5, 1.5e-4],
+        spread: vec![1.0; 2],
+        detail: "all joints yield, as under a payload that is not the recorded one".to_owned(),
+    });
     all.push(simple(Kind::MeasurementScale, None, Shape::Scale, [10e-6, 100e-6]));
     all
 }
@@ -137,18 +145,19 @@ fn nameless(joint: usize, turns: bool, columns: &Columns, all: &mut Vec<Hypothes
                 push(Shape::Bump { joint, centre, half_width }, angle, vec![1.0], detail);
             }
         }
-        push(
-            Shape::Crosstalk(joint),
-            [0.3e-5, 3e-5],
-            vec![half; 2],
-            format!("moment across the axis of joint {} turns it", joint + 1),
-        );
+        for moving in [false, true] {
+            let detail = format!("moment across the axis of joint {} turns it", joint + 1);
+            push(Shape::Crosstalk { joint, moving }, [0.3e-5, 3e-5], vec![half; 2], detail);
+        }
     }
     let detail = format!("turn of joint {} not proportional to its torque", joint + 1);
-    push(Shape::Hardening(joint), [2e-5, 2e-4], vec![1.0, 0.5], detail);
+    push(Shape::Softening(joint), [2e-5, 2e-4], vec![1.0, 0.5], detail.clone());
+    push(Shape::Hardening(joint), [2e-5, 2e-4], vec![1.0; 2], detail);
     if columns.time {
-        let detail = format!("joint {} follows the torque of the reading before", joint + 1);
-        push(Shape::TorqueBefore(joint), [0.5e-5, 5e-5], vec![1.0], detail);
+        for (which, time) in FORGETTING_S.iter().enumerate() {
+            let detail = format!("joint {} yields slowly, over about {time:.0} s", joint + 1);
+            push(Shape::TorqueMemory(joint, which), [0.5e-5, 5e-5], vec![1.0], detail);
+        }
         for way in MEMORIES {
             push(Shape::Memory(joint, way), angle, vec![0.5], format!("joint {} remembers its last moves", joint + 1));
         }

@@ -49,12 +49,22 @@ pub enum Shape {
         /// rad.
         half_width: f64,
     },
-    /// \[2\] The moments about the x and y axes of a joint's frame turn it about z.
-    Crosstalk(usize),
+    /// \[2\] The moments about the x and y axes of a joint's frame turn it about z; the frame is that of the moving side or of the
+    /// side that the joint moves on.
+    Crosstalk {
+        /// The joint.
+        joint: usize,
+        /// The moving side.
+        moving: bool,
+    },
     /// \[2\] Torque, and its cube, turn a joint.
+    Softening(usize),
+    /// \[2\] Torque, and the root of its size with its sign, turn a joint.
     Hardening(usize),
-    /// \[1\] The torque before the last move turns a joint.
-    TorqueBefore(usize),
+    /// \[1\] The torque of past readings, forgotten over a time ([`FORGETTING_S`]), turns a joint.
+    TorqueMemory(usize, usize),
+    /// \[2\] All joints yield alike, to the torque and to that of a mass that the tool carries besides.
+    AllYield,
     /// \[1\] The direction of the last move, times the size of the torque.
     DirectionLoad(usize),
     /// \[1\] The direction of the last move that was long enough fades with a joint's way: Dahl's memory of a way (rad).
@@ -84,16 +94,19 @@ pub struct Reading {
     pub share: f64,
     /// Place in time.
     pub order: usize,
-    /// Torque of each joint at the reading before, N·m.
-    pub torque_before: Vec<f64>,
-    /// Way of each joint since the reading before, with its sign.
-    pub way: Vec<f64>,
+    /// Each joint's torque as it is remembered, by [`FORGETTING_S`], N·m.
+    pub torque_memory: Vec<[f64; FORGETTING_S.len()]>,
+    /// Free fall, m/s².
+    pub gravity: Vector3<f64>,
     /// Memory of each joint's moves, by [`MEMORIES`].
     pub memory: Vec<[f64; MEMORIES.len()]>,
 }
 
 /// Ways (rad) over which a joint may forget.
 pub const MEMORIES: [f64; 2] = [0.4, 1.2];
+
+/// Times (s) over which a joint may yield.
+pub const FORGETTING_S: [f64; 3] = [25.0, 60.0, 150.0];
 
 /// Displacement of the target: shift (m) and turn (rad), in root.
 pub type Displacement = [f64; 6];
@@ -169,15 +182,43 @@ impl Shape {
                 let height = if distance < 1.0 { 0.5 * (1.0 + libm::cos(std::f64::consts::PI * distance)) } else { 0.0 };
                 vec![reading.moved(joint, height)]
             }
-            Shape::Crosstalk(joint) => {
-                let frame: &Matrix3<f64> = &posture.frames[joint];
+            Shape::Crosstalk { joint, moving } => {
+                let mut frame = posture.frames[joint];
+                if !moving {
+                    // Back by the joint's angle about z.
+                    let (sine, cosine) = libm::sincos(reading.joints[joint]);
+                    let (x, y): (Vector3<f64>, Vector3<f64>) = (frame.column(0).into(), frame.column(1).into());
+                    frame = Matrix3::from_columns(&[x * cosine - y * sine, y * cosine + x * sine, posture.axes[joint]]);
+                }
                 [0, 1].map(|axis| reading.moved(joint, frame.column(axis).dot(&posture.moments[joint]))).to_vec()
             }
-            Shape::Hardening(joint) => {
+            Shape::Softening(joint) => {
                 let effort = reading.effort(joint);
                 vec![reading.moved(joint, effort), reading.moved(joint, effort * effort * effort / 1e4)]
             }
-            Shape::TorqueBefore(joint) => vec![reading.moved(joint, reading.torque_before[joint])],
+            Shape::Hardening(joint) => {
+                let effort = reading.effort(joint);
+                let root = 10.0 * libm::sqrt(effort.abs()) * effort.signum();
+                vec![reading.moved(joint, effort), reading.moved(joint, root)]
+            }
+            Shape::TorqueMemory(joint, which) => vec![reading.moved(joint, reading.torque_memory[joint][which])],
+            Shape::AllYield => {
+                let joints = 0..reading.joints.len();
+                let own: Vec<Displacement> = joints.clone().map(|joint| reading.moved(joint, reading.effort(joint))).collect();
+                let of_mass = joints
+                    .map(|joint| {
+                        let axis = posture.axes[joint];
+                        let lever = posture.tool - posture.origins[joint];
+                        let force = reading.gravity;
+                        let effort = if reading.slides[joint] { force.dot(&axis) } else { axis.dot(&lever.cross(&force)) };
+                        reading.moved(joint, effort)
+                    })
+                    .collect::<Vec<_>>();
+                let sum = |parts: Vec<Displacement>| {
+                    parts.iter().fold([0.0; 6], |sum, part| std::array::from_fn(|at| sum[at] + part[at]))
+                };
+                vec![sum(own), sum(of_mass)]
+            }
             Shape::DirectionLoad(joint) => {
                 vec![reading.moved(joint, 0.5 * reading.approach[joint] * reading.effort(joint).abs())]
             }
@@ -195,7 +236,12 @@ impl Shape {
     #[must_use]
     pub fn width(&self, attitude: bool) -> usize {
         match self {
-            Shape::Harmonic(..) | Shape::Crosstalk(_) | Shape::Hardening(_) | Shape::TimeCurve(_) => 2,
+            Shape::Harmonic(..)
+            | Shape::Crosstalk { .. }
+            | Shape::Softening(_)
+            | Shape::Hardening(_)
+            | Shape::AllYield
+            | Shape::TimeCurve(_) => 2,
             Shape::BaseDrift | Shape::BaseStep(_) => 6,
             Shape::ToolStep(_) => {
                 if attitude {
