@@ -72,7 +72,9 @@ fn dispatch(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if let Some(threads) = global.threads {
         rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global()?;
     }
-    if let (Some(seed), Command::Diagnose(_) | Command::Identify(_) | Command::Replay(_) | Command::Export(_)) = (global.seed, &arguments.command) {
+    if let (Some(seed), Command::Diagnose(_) | Command::Identify(_) | Command::Replay(_) | Command::Export(_)) =
+        (global.seed, &arguments.command)
+    {
         ensure!(
             false,
             "--seed {seed}: this command draws nothing; leave it out, or give it to run, design, measure, reproduce, sweep or challenge new"

@@ -76,7 +76,9 @@ impl Candidates {
             (Some(x), Some(y)) => x == y && a.location == b.location && !matches!(x, Kind::StrainWaveError | Kind::GearCoupling),
             // A cubic spring has the linear one in it.
             (Some(Kind::JointCompliance), None) | (None, Some(Kind::JointCompliance)) | (None, None) => {
-                a.location == b.location && (is_hardening(a) || is_hardening(b)) && (a.kind != b.kind || is_hardening(a) == is_hardening(b))
+                a.location == b.location
+                    && (is_hardening(a) || is_hardening(b))
+                    && (a.kind != b.kind || is_hardening(a) == is_hardening(b))
             }
             _ => false,
         }
@@ -130,8 +132,7 @@ fn solve(surviving: &Surviving, candidates: &Candidates, members: &[(usize, usiz
     let cholesky = Cholesky::new(products)?;
     let coefficients = cholesky.solve(&right);
     let drop = right.dot(&coefficients);
-    let log_determinant =
-        (0..count).map(|i| 2.0 * libm::log(cholesky.l_dirty()[(i, i)]) - libm::log(precision[i])).sum::<f64>();
+    let log_determinant = (0..count).map(|i| 2.0 * libm::log(cholesky.l_dirty()[(i, i)]) - libm::log(precision[i])).sum::<f64>();
     Some((Extended { columns, inverse: cholesky.inverse(), coefficients, drop, log_determinant }, cholesky))
 }
 
@@ -146,7 +147,11 @@ fn log_ratio(surviving: &Surviving, noise: NoisePrior, drop: f64, log_determinan
 fn log_allowed(mean: f64, sigma: f64) -> f64 {
     let z = mean / sigma.max(1e-300);
     // Below this the tail is so thin that its logarithm is what counts.
-    if z < -6.0 { -0.5 * z * z - libm::log(-z) - 0.919 + 0.693 } else { libm::log(libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)) }
+    if z < -6.0 {
+        -0.5 * z * z - libm::log(-z) - 0.919 + 0.693
+    } else {
+        libm::log(libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2))
+    }
 }
 
 /// Evidence and prior of `members` together.

@@ -39,11 +39,7 @@ impl Gram {
     /// Without the rows of `part`.
     #[must_use]
     pub fn without(&self, part: &Gram) -> Gram {
-        Gram {
-            products: &self.products - &part.products,
-            geometry: self.geometry,
-            equations: self.equations - part.equations,
-        }
+        Gram { products: &self.products - &part.products, geometry: self.geometry, equations: self.equations - part.equations }
     }
 
     /// Everything that the geometry can absorb taken out. `used`: the parameters that may move; `offset`: the prior's pull on each

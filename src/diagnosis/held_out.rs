@@ -63,7 +63,8 @@ pub fn regions(points: &[Vector3<f64>], folds: usize) -> Vec<usize> {
             *fold = (0..centres.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0);
         }
         for (number, centre) in centres.iter_mut().enumerate() {
-            let of_fold: Vec<&Vector3<f64>> = points.iter().zip(&fold).filter(|(_, of)| **of == number).map(|(at, _)| at).collect();
+            let of_fold: Vec<&Vector3<f64>> =
+                points.iter().zip(&fold).filter(|(_, of)| **of == number).map(|(at, _)| at).collect();
             if !of_fold.is_empty() {
                 *centre = of_fold.iter().copied().sum::<Vector3<f64>>() / of_fold.len() as f64;
             }
@@ -83,7 +84,10 @@ pub fn cross_validate(
 ) -> Vec<Fold> {
     use rayon::prelude::*;
     let total = sum(grams);
-    (0..grams.len()).into_par_iter().filter_map(|number| leave_out(problem, &total, grams, number, candidates, noise, most)).collect()
+    (0..grams.len())
+        .into_par_iter()
+        .filter_map(|number| leave_out(problem, &total, grams, number, candidates, noise, most))
+        .collect()
 }
 
 /// The sum of all blocks.
@@ -131,8 +135,9 @@ fn leave_out(
             for axis in 0..3 {
                 let equation = problem.raw.row(row * problem.per_row + axis);
                 let geometry: f64 = (0..problem.geometry).map(|column| equation[column] * change[column]).sum();
-                let effects: f64 =
-                    surviving_columns(members, candidates).map(|column| equation[problem.geometry + column] * coefficients[column]).sum();
+                let effects: f64 = surviving_columns(members, candidates)
+                    .map(|column| equation[problem.geometry + column] * coefficients[column])
+                    .sum();
                 let left = equation[last] - geometry - effects;
                 sum += left * left;
             }

@@ -14,6 +14,8 @@ pub mod outliers;
 pub mod power;
 pub mod rows;
 pub mod search;
+#[cfg(test)]
+mod tests;
 mod verdict;
 
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -80,7 +82,12 @@ pub(crate) struct Repeats {
 ///
 /// # Errors
 /// If the measurements cannot tell where the arm stands, or are not this robot's.
-pub fn diagnose(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], options: &Options) -> Result<Diagnosis, DiagnosisError> {
+pub fn diagnose(
+    arm: &Arm,
+    sensor: &Sensor,
+    measurements: &[&Measurement],
+    options: &Options,
+) -> Result<Diagnosis, DiagnosisError> {
     let total = measurements.len();
     let rows = rows::fit(arm, sensor, measurements, &vec![1.0; total])?;
     let conditions = conditions::conditions(measurements, &rows);
@@ -92,7 +99,10 @@ pub fn diagnose(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], optio
     let noise = match (repeats, options.noise) {
         (Some(repeats), _) => {
             let declared = mean_sigma(sensor, measurements);
-            NoisePrior { freedom: repeats.freedom.min(20.0), level: (repeats.position_m / declared) * (repeats.position_m / declared) }
+            NoisePrior {
+                freedom: repeats.freedom.min(20.0),
+                level: (repeats.position_m / declared) * (repeats.position_m / declared),
+            }
         }
         (None, NoiseSource::Assumed) => NoisePrior { freedom: 1.0, level: 1.0 },
         (None, _) => NoisePrior { freedom: 10.0, level: 1.0 },
@@ -234,10 +244,8 @@ fn blocks(
     (0..folds)
         .into_par_iter()
         .map(|number| {
-            let equations: Vec<usize> = (0..fold.len())
-                .filter(|row| fold[*row] == number)
-                .flat_map(|row| row * per_row..(row + 1) * per_row)
-                .collect();
+            let equations: Vec<usize> =
+                (0..fold.len()).filter(|row| fold[*row] == number).flat_map(|row| row * per_row..(row + 1) * per_row).collect();
             let mut block = raw.select_rows(&equations);
             for (at, equation) in equations.iter().enumerate() {
                 block.row_mut(at).scale_mut(whitening[*equation]);
@@ -289,9 +297,15 @@ fn weigh(candidates: &mut Candidates, surviving: &Surviving) {
     for number in &active {
         let (kind, shape, _) = key(*number);
         let classes = distinct(
-            active.iter().map(|other| key(*other)).filter(|other| other.0.is_some() == kind.is_some()).map(|other| (other.0, other.1, None)).collect(),
+            active
+                .iter()
+                .map(|other| key(*other))
+                .filter(|other| other.0.is_some() == kind.is_some())
+                .map(|other| (other.0, other.1, None))
+                .collect(),
         );
-        let places = distinct(active.iter().map(|other| key(*other)).filter(|other| (other.0, other.1) == (kind, shape)).collect());
+        let places =
+            distinct(active.iter().map(|other| key(*other)).filter(|other| (other.0, other.1) == (kind, shape)).collect());
         let variants = active.iter().filter(|other| key(**other) == key(*number)).count() as f64;
         let share = if kind.is_some() { 1.0 - NAMELESS } else { NAMELESS };
         log_odds[*number] = libm::log(ODDS * share / (classes * places * variants));
@@ -329,7 +343,11 @@ fn repeats(measurements: &[&Measurement]) -> Option<Repeats> {
         }
         let a = measurements[first];
         let alike = |b: &Measurement| {
-            a.pose_id == b.pose_id && a.joints == b.joints && a.approach == b.approach && a.payload_kg == b.payload_kg && a.target == b.target
+            a.pose_id == b.pose_id
+                && a.joints == b.joints
+                && a.approach == b.approach
+                && a.payload_kg == b.payload_kg
+                && a.target == b.target
         };
         let group: Vec<usize> = (first..measurements.len()).filter(|row| alike(measurements[*row])).collect();
         for row in &group {

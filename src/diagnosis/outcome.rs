@@ -4,6 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::effects::Level;
 
+/// JSON Schema of [`Diagnosis`].
+pub const SCHEMA: &str = include_str!("schema.json");
+
 /// The answer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {

@@ -53,7 +53,9 @@ pub fn look(squares: &[f64], per_row: usize, left: f64) -> Outliers {
             squares
                 .iter()
                 .map(|square| {
-                    libm::log((1.0 - share) * density(*square, *scale) + share * density(*square, scale * factor * factor) + 1e-300)
+                    libm::log(
+                        (1.0 - share) * density(*square, *scale) + share * density(*square, scale * factor * factor) + 1e-300,
+                    )
                 })
                 .sum::<f64>()
         };

@@ -229,7 +229,11 @@ pub fn fit(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], weights: &
         let done = change.as_ref().is_none_or(|change| change.norm() < 1e-9) || step >= STEPS;
         if (done && !coarse) || step >= STEPS {
             let rms = libm::sqrt(
-                measurements.iter().enumerate().map(|(row, _)| residual.fixed_rows::<3>(row * per_row).norm_squared()).sum::<f64>()
+                measurements
+                    .iter()
+                    .enumerate()
+                    .map(|(row, _)| residual.fixed_rows::<3>(row * per_row).norm_squared())
+                    .sum::<f64>()
                     / measurements.len() as f64,
             );
             let reach: f64 = mechanism.segments.iter().map(|segment| segment.translation.vector.norm()).sum();

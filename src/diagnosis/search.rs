@@ -145,7 +145,12 @@ pub fn search(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior,
 }
 
 /// The members in the order in which each adds most to what those before it explain.
-fn in_order(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior, members: &[(usize, usize)]) -> Vec<(usize, usize)> {
+fn in_order(
+    surviving: &Surviving,
+    candidates: &Candidates,
+    noise: NoisePrior,
+    members: &[(usize, usize)],
+) -> Vec<(usize, usize)> {
     let mut left = members.to_vec();
     let mut ordered: Vec<(usize, usize)> = Vec::new();
     while !left.is_empty() {

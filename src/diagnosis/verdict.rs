@@ -4,7 +4,8 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::evidence::{SCALES, fit, one_signed};
 use super::outcome::{
-    Candidate, Diagnosis, Effect, Gap, Magnitude, MinimumDetectable, NoiseFloor, NoiseSource, Place, Undetectable, Unknown, Verdict,
+    Candidate, Diagnosis, Effect, Gap, Magnitude, MinimumDetectable, NoiseFloor, NoiseSource, Place, Undetectable, Unknown,
+    Verdict,
 };
 use super::power::{Power, power};
 use super::{Analysis, mean_sigma};
@@ -64,11 +65,9 @@ fn magnitude(analysis: &Analysis<'_>, hypothesis: usize) -> Option<Magnitude> {
     let columns = analysis.candidates.columns(hypothesis);
     // Of a twist, the length of its translation.
     let width = if matches!(of.shape, Shape::BaseDrift | Shape::BaseStep(_) | Shape::ToolStep(_)) { 3 } else { columns.len() };
-    let at: Vec<usize> =
-        columns.take(width).filter_map(|column| fit.columns.iter().position(|known| *known == column)).collect();
+    let at: Vec<usize> = columns.take(width).filter_map(|column| fit.columns.iter().position(|known| *known == column)).collect();
     let value = |i: usize| fit.coefficients[at[i]] * unit * of.spread[i];
-    let covariance =
-        |i: usize, j: usize| fit.noise * fit.covariance[(at[i], at[j])] * unit * unit * of.spread[i] * of.spread[j];
+    let covariance = |i: usize, j: usize| fit.noise * fit.covariance[(at[i], at[j])] * unit * unit * of.spread[i] * of.spread[j];
     let freedom = (analysis.surviving.freedom + analysis.noise.freedom).max(1.0);
     let quantile = StudentsT::new(0.0, 1.0, freedom).map_or(1.96, |student| student.inverse_cdf(0.975));
     let name = of.kind.map_or("", Kind::unit).to_owned();
@@ -120,7 +119,13 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
         rms(analysis
             .folds
             .iter()
-            .map(|fold| if count == 0 { fold.geometry } else { *fold.explained.get(count - 1).or(fold.explained.last()).unwrap_or(&fold.geometry) })
+            .map(|fold| {
+                if count == 0 {
+                    fold.geometry
+                } else {
+                    *fold.explained.get(count - 1).or(fold.explained.last()).unwrap_or(&fold.geometry)
+                }
+            })
             .sum())
     };
     let explained_rms_m = after(usize::MAX);
@@ -146,7 +151,15 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
         let half = student.inverse_cdf(0.975) * libm::sqrt(variance / n);
         (n > 2.0).then_some([mean - half, mean + half])
     });
-    let gap = Gap { nominal_rms_m, geometry_rms_m, explained_rms_m, noise_rms_m: noise_rms, gap_closed, gap_closed_ci95, folds: analysis.folds.len() };
+    let gap = Gap {
+        nominal_rms_m,
+        geometry_rms_m,
+        explained_rms_m,
+        noise_rms_m: noise_rms,
+        gap_closed,
+        gap_closed_ci95,
+        folds: analysis.folds.len(),
+    };
 
     let best = fit(analysis.surviving, analysis.candidates, analysis.noise, &analysis.found.best.members);
     let level = best.map_or(1.0, |fit| fit.noise);
@@ -158,7 +171,14 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
     let known = !matches!(source, NoiseSource::Assumed);
     let excess = known && level > EXCESS * (position_m / declared) * (position_m / declared);
     let present = of_nameless >= NAMED || structured || excess;
-    let unknown_members: Vec<usize> = analysis.found.best.members.iter().map(|(hypothesis, _)| *hypothesis).filter(|hypothesis| analysis.candidates.hypotheses[*hypothesis].kind.is_none()).collect();
+    let unknown_members: Vec<usize> = analysis
+        .found
+        .best
+        .members
+        .iter()
+        .map(|(hypothesis, _)| *hypothesis)
+        .filter(|hypothesis| analysis.candidates.hypotheses[*hypothesis].kind.is_none())
+        .collect();
     let r#where = present.then(|| {
         let mut said: Vec<String> =
             unknown_members.iter().map(|hypothesis| analysis.candidates.hypotheses[*hypothesis].detail.clone()).collect();
@@ -222,7 +242,8 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
         let names: Vec<String> =
             outliers.rows.iter().take(20).map(|row| (analysis.measurements[*row].index + 1).to_string()).collect();
         let more = if outliers.rows.len() > 20 { format!(" and {} more", outliers.rows.len() - 20) } else { String::new() };
-        notes.push(format!("readings far off, weighted down and not counted in held-out errors: rows {}{more}", names.join(", ")));
+        notes
+            .push(format!("readings far off, weighted down and not counted in held-out errors: rows {}{more}", names.join(", ")));
     }
 
     let confusion_sets = confusion(analysis);
@@ -296,7 +317,8 @@ fn confusion(analysis: &Analysis<'_>) -> Vec<Vec<Candidate>> {
     claims.retain(|(_, probability, _)| *probability >= WORTH_SAYING && *probability < SURE);
     // Claims of one set exclude each other: they are hardly ever in one model.
     let together = |a: &Claim, b: &Claim| -> f64 {
-        let has = |members: &[(usize, usize)], one: &Claim| members.iter().any(|(hypothesis, _)| claim(analysis, *hypothesis) == *one);
+        let has =
+            |members: &[(usize, usize)], one: &Claim| members.iter().any(|(hypothesis, _)| claim(analysis, *hypothesis) == *one);
         let models = analysis.found.models.iter();
         models.filter(|(members, _)| has(members, a) && has(members, b)).map(|(_, weight)| weight).sum()
     };
@@ -436,14 +458,7 @@ fn of_place(kind: &str, place: &Place) -> String {
 }
 
 /// The verdict in a sentence.
-fn sentence(
-    verdict: Verdict,
-    effects: &[Effect],
-    sets: &[Vec<Candidate>],
-    unknown: &Unknown,
-    gap: &Gap,
-    share: f64,
-) -> String {
+fn sentence(verdict: Verdict, effects: &[Effect], sets: &[Vec<Candidate>], unknown: &Unknown, gap: &Gap, share: f64) -> String {
     let list = |effects: &[Effect]| {
         let names: Vec<String> = effects
             .iter()

@@ -12,10 +12,12 @@ pub fn text(diagnosis: &Diagnosis) -> String {
     if !diagnosis.effects.is_empty() {
         text.push('\n');
         text.push_str(&causes(diagnosis));
+        text.push('\n');
     }
     for set in &diagnosis.confusion_sets {
         text.push_str("\nThese cannot be told apart:\n");
         text.push_str(&candidates(set));
+        text.push('\n');
     }
     if diagnosis.unknown.present {
         let place = diagnosis.unknown.r#where.clone().unwrap_or_default();
@@ -70,6 +72,7 @@ fn waterfall(diagnosis: &Diagnosis) -> String {
     rows.push(vec!["all that each fold chose".to_owned(), um(gap.explained_rms_m), bar(gap.explained_rms_m)]);
     rows.push(vec![format!("noise floor ({source})"), um(gap.noise_rms_m), bar(gap.noise_rms_m)]);
     let mut text = table(&[&format!("held out, {} folds", gap.folds), "RMS, µm", ""], rows);
+    text.push('\n');
     if let Some(closed) = gap.gap_closed {
         let interval = gap
             .gap_closed_ci95
@@ -138,9 +141,7 @@ fn place(place: &Place) -> String {
 fn candidates(set: &[Candidate]) -> String {
     let rows = set
         .iter()
-        .map(|one| {
-            vec![one.kind.clone(), place(&one.location), format!("{:.1} %", 100.0 * one.probability), one.detail.clone()]
-        })
+        .map(|one| vec![one.kind.clone(), place(&one.location), format!("{:.1} %", 100.0 * one.probability), one.detail.clone()])
         .collect();
     table(&["kind", "where", "probability", ""], rows)
 }

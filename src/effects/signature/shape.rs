@@ -118,11 +118,7 @@ fn twist(shift: Vector3<f64>, turn: Vector3<f64>) -> Displacement {
 impl Reading {
     /// Torque (N·m) or, where the joint slides, the force along it (N).
     fn effort(&self, joint: usize) -> f64 {
-        if self.slides[joint] {
-            self.posture.forces[joint].dot(&self.posture.axes[joint])
-        } else {
-            self.posture.torque(joint)
-        }
+        if self.slides[joint] { self.posture.forces[joint].dot(&self.posture.axes[joint]) } else { self.posture.torque(joint) }
     }
 
     /// The joint moves by `amount`.
