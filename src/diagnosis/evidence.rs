@@ -74,6 +74,8 @@ impl Candidates {
         let (a, b) = (&self.hypotheses[a], &self.hypotheses[b]);
         match (a.kind, b.kind) {
             (Some(x), Some(y)) => x == y && a.location == b.location && !matches!(x, Kind::StrainWaveError | Kind::GearCoupling),
+            // Two bumps that overlap are one.
+            (None, None) if a.location == b.location && overlap(a, b) => true,
             // A cubic spring has the linear one in it.
             (Some(Kind::JointCompliance), None) | (None, Some(Kind::JointCompliance)) | (None, None) => {
                 a.location == b.location
@@ -82,6 +84,14 @@ impl Candidates {
             }
             _ => false,
         }
+    }
+}
+
+fn overlap(a: &Hypothesis, b: &Hypothesis) -> bool {
+    use crate::effects::signature::shape::Shape;
+    match (a.shape, b.shape) {
+        (Shape::Bump { centre: x, half_width: w, .. }, Shape::Bump { centre: y, half_width: v, .. }) => (x - y).abs() < w.max(v),
+        _ => false,
     }
 }
 

@@ -267,6 +267,7 @@ fn class(hypothesis: &Hypothesis) -> (Option<Kind>, u8) {
         Shape::DirectionLoad(_) => 6,
         Shape::Memory(..) => 7,
         Shape::AllYield => 8,
+        Shape::AngleCurve(_) => 10,
         _ => 9,
     };
     (hypothesis.kind, shape)

@@ -202,9 +202,11 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
         }
         let probability = probability(analysis, |other| claim(analysis, other) == this);
         let chosen = analysis.folds.iter().filter(|fold| fold.chosen.iter().any(|other| claim(analysis, *other) == this)).count();
-        // Beside something unknown a name may only stand in for it: it must be sure, and the same whatever is left out.
+        // Beside something unknown a name may only stand in for it: it must be sure, the same whatever is left out, and help more than
+        // what has no name.
         let needed = if present { SURE } else { NAMED };
-        let stable = !present || 5 * chosen >= 4 * analysis.folds.len();
+        let before_unknown = analysis.found.best.members[..step].iter().all(|(other, _)| !unknown_members.contains(other));
+        let stable = !present || (before_unknown && 5 * chosen >= 4 * analysis.folds.len());
         let Some(magnitude) = magnitude(analysis, *hypothesis).filter(|_| probability >= needed && stable) else {
             continue;
         };

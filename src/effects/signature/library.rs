@@ -145,6 +145,12 @@ fn nameless(joint: usize, turns: bool, columns: &Columns, all: &mut Vec<Hypothes
                 push(Shape::Bump { joint, centre, half_width }, angle, vec![1.0], detail);
             }
         }
+        push(
+            Shape::AngleCurve(joint),
+            [5e-5, 40e-5],
+            vec![1.0, 0.5, 0.5],
+            format!("error of joint {} grows with its angle", joint + 1),
+        );
         for moving in [false, true] {
             let detail = format!("moment across the axis of joint {} turns it", joint + 1);
             push(Shape::Crosstalk { joint, moving }, [0.3e-5, 3e-5], vec![half; 2], detail);

@@ -49,6 +49,8 @@ pub enum Shape {
         /// rad.
         half_width: f64,
     },
+    /// \[3\] A joint turns with its angle, the square and the cube of it.
+    AngleCurve(usize),
     /// \[2\] The moments about the x and y axes of a joint's frame turn it about z; the frame is that of the moving side or of the
     /// side that the joint moves on.
     Crosstalk {
@@ -178,6 +180,10 @@ impl Shape {
                 let height = if distance < 1.0 { 0.5 * (1.0 + libm::cos(std::f64::consts::PI * distance)) } else { 0.0 };
                 vec![reading.moved(joint, height)]
             }
+            Shape::AngleCurve(joint) => {
+                let angle = reading.joints[joint];
+                [angle, angle * angle, angle * angle * angle / 3.0].map(|amount| reading.moved(joint, amount)).to_vec()
+            }
             Shape::Crosstalk { joint, moving } => {
                 let mut frame = posture.frames[joint];
                 if !moving {
@@ -238,6 +244,7 @@ impl Shape {
             | Shape::Hardening(_)
             | Shape::AllYield
             | Shape::TimeCurve(_) => 2,
+            Shape::AngleCurve(_) => 3,
             Shape::BaseDrift | Shape::BaseStep(_) => 6,
             Shape::ToolStep(_) => {
                 if attitude {
