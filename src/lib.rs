@@ -7,6 +7,7 @@ pub mod arm;
 pub mod cell;
 pub mod cli;
 pub mod design;
+pub mod diagnosis;
 pub mod effects;
 pub mod experiments;
 pub mod figure;

@@ -44,6 +44,7 @@ struct Row {
     role: Role,
     joints: Vec<f64>,
     payload_kg: f64,
+    dwell_s: f64,
 }
 
 /// The order of measuring: chosen and held-out configurations and their repeats shuffled, so that neither sees only one part of a
@@ -57,6 +58,7 @@ pub fn plan(scene: &Scene, chosen: &[Vec<f64>], held_out: &[Vec<f64>]) -> Vec<Pl
             role,
             joints: joints.clone(),
             payload_kg: payloads[index % payloads.len()],
+            dwell_s: scene.plan.dwell_s,
         };
         configurations.iter().enumerate().map(row).collect::<Vec<_>>()
     };
@@ -85,6 +87,7 @@ pub fn as_measured(scene: &Scene, measurements: &[Measurement]) -> Vec<Planned> 
         role: row.role,
         joints: row.joints.clone(),
         payload_kg: row.payload_kg.unwrap_or_default(),
+        dwell_s: row.dwell_s.unwrap_or(scene.plan.dwell_s),
     };
     let times = measurements.iter().map(|row| row.time_s).collect();
     in_order(scene, measurements.iter().map(row).collect(), times)
@@ -136,13 +139,13 @@ fn part_repeats(rows: &mut [Row]) {
 /// Rows in the order of measuring, with the moves between them.
 fn in_order(scene: &Scene, rows: Vec<Row>, times: Vec<f64>) -> Vec<Planned> {
     let mut before = vec![0.0; scene.arm.joint_count()];
-    let planned = rows.into_iter().zip(times).map(|(Row { pose_id, role, joints, payload_kg }, time_s)| {
+    let planned = rows.into_iter().zip(times).map(|(Row { pose_id, role, joints, payload_kg, dwell_s }, time_s)| {
         let before = std::mem::replace(&mut before, joints.clone());
         let from = match directions(scene, pose_id) {
             Some(directions) => start_of_move(scene, &joints, &directions),
             None => before,
         };
-        Planned { pose_id, role, joints, from, payload_kg, time_s, dwell_s: scene.plan.dwell_s }
+        Planned { pose_id, role, joints, from, payload_kg, time_s, dwell_s }
     });
     planned.collect()
 }

@@ -67,6 +67,12 @@ pub(crate) enum Command {
         A table's header names columns and units: q1_rad… (or _deg), x_m, y_m, z_m (or _mm), optional qx, qy, qz, qw,\n\
         pose_id, time_s, role (fit, held_out), temp1_c…. The measurement frame and the target on the flange are fitted.")]
     Identify(IdentifyOptions),
+    /// Say which un-modelled effect causes what calibration leaves, where, and with what probability
+    #[command(after_help = "Examples:\n  kincal diagnose recordings/arm8-measure.mcap\n  \
+        kincal diagnose grid.csv --robot ur5.urdf --position-noise-um 25 --json\n\n\
+        Besides the columns of `kincal identify` a table may have approach1… (-1, 0, 1), temp_ambient_c, payload_kg, dwell_s,\n\
+        session and target. What is missing switches off what needs it. Exit code 1: there is a gap that is not explained.")]
+    Diagnose(DiagnoseOptions),
     /// Recompute a recording and compare bit for bit
     #[command(after_help = "Examples:\n  kincal replay recordings/arm8.mcap\n  \
         kincal replay recordings/arm8.mcap --truth recordings/arm8.truth.toml\n  \
@@ -220,13 +226,9 @@ pub(crate) struct MeasureOptions {
     pub(crate) design: PathBuf,
 }
 
+/// The robot and the sensor of a table.
 #[derive(Debug, Args)]
-pub(crate) struct IdentifyOptions {
-    /// Recording (.mcap) or table of measurements (.csv)
-    pub(crate) input: PathBuf,
-    /// Other measurements of the same arm that carry the held-out error
-    #[arg(long, value_name = "FILE")]
-    pub(crate) evaluate: Option<PathBuf>,
+pub(crate) struct RobotOptions {
     /// Nominal robot of a table: a URDF or a scene
     #[arg(long, value_name = "FILE")]
     pub(crate) robot: Option<PathBuf>,
@@ -236,12 +238,37 @@ pub(crate) struct IdentifyOptions {
     /// Link of the URDF that carries the target
     #[arg(long, value_name = "LINK")]
     pub(crate) tip_link: Option<String>,
-    /// Declared position noise of a table's sensor, one sigma per axis
-    #[arg(long, value_name = "UM", default_value_t = 20.0, allow_negative_numbers = true)]
-    pub(crate) position_noise_um: f64,
-    /// Declared attitude noise of a table's sensor, one sigma per axis
-    #[arg(long, value_name = "DEG", default_value_t = 0.005, allow_negative_numbers = true)]
-    pub(crate) attitude_noise_deg: f64,
+    /// Declared position noise of a table's sensor, one sigma per axis [default: 20]
+    #[arg(long, value_name = "UM", allow_negative_numbers = true)]
+    pub(crate) position_noise_um: Option<f64>,
+    /// Declared attitude noise of a table's sensor, one sigma per axis [default: 0.005]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    pub(crate) attitude_noise_deg: Option<f64>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct DiagnoseOptions {
+    /// Recording (.mcap) or table of measurements (.csv)
+    pub(crate) input: PathBuf,
+    #[command(flatten)]
+    pub(crate) robot: RobotOptions,
+    /// Kinds of effects that are not to be looked for
+    #[arg(long, value_name = "KIND", value_delimiter = ',')]
+    pub(crate) without: Vec<String>,
+    /// Use a recording that was cut off, up to the cut
+    #[arg(long)]
+    pub(crate) partial: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct IdentifyOptions {
+    /// Recording (.mcap) or table of measurements (.csv)
+    pub(crate) input: PathBuf,
+    /// Other measurements of the same arm that carry the held-out error
+    #[arg(long, value_name = "FILE")]
+    pub(crate) evaluate: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) robot: RobotOptions,
     /// Print every identifiable combination
     #[arg(long)]
     pub(crate) parameters: bool,

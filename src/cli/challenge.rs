@@ -30,9 +30,19 @@ const GUESSABLE: u64 = 1 << 40;
 /// The diagnosis that finds nothing.
 const BASELINE: (&str, Diagnose) = ("the baseline that never finds anything", nothing);
 
-/// Kincal's own diagnosis with its name, once there is one.
+/// Kincal's own diagnosis with its name.
 fn diagnosis() -> Option<(&'static str, Diagnose)> {
-    None
+    Some(("kincal diagnose", diagnosed))
+}
+
+/// What `kincal diagnose` says of a case.
+fn diagnosed(case: &folder::Case) -> Result<serde_json::Value, String> {
+    let scene = crate::scene::parse(&case.start.scene, &case.name).map_err(|error| error.to_string())?.scene;
+    let rows: Vec<_> = case.measurements.iter().collect();
+    let without = case.withheld.iter().filter_map(|name| Kind::from_name(name)).collect();
+    let options = crate::diagnosis::Options { noise: crate::diagnosis::outcome::NoiseSource::Declared, without };
+    let found = crate::diagnosis::diagnose(&scene.arm, &scene.sensor, &rows, &options).map_err(|error| error.to_string())?;
+    serde_json::to_value(&found).map_err(|error| error.to_string())
 }
 
 pub(crate) fn command(global: &Global, command: &ChallengeCommand) -> anyhow::Result<Outcome> {

@@ -5,7 +5,7 @@ use serde_json::json;
 
 use super::Outcome;
 use super::arguments::{ExportOptions, Format, Global};
-use super::identify::{input_stem, is_recording};
+use super::input::{input_stem, is_recording};
 use super::output;
 use crate::kinematics::urdf;
 use crate::measurement::{Measurement, table};

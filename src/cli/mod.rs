@@ -5,9 +5,11 @@
 mod arguments;
 mod challenge;
 mod design;
+mod diagnose;
 mod effects;
 mod export;
 mod identify;
+mod input;
 mod measure;
 mod output;
 mod replay;
@@ -70,7 +72,9 @@ fn dispatch(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if let Some(threads) = global.threads {
         rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global()?;
     }
-    if let (Some(seed), Command::Identify(_) | Command::Replay(_) | Command::Export(_)) = (global.seed, &arguments.command) {
+    if let (Some(seed), Command::Diagnose(_) | Command::Identify(_) | Command::Replay(_) | Command::Export(_)) =
+        (global.seed, &arguments.command)
+    {
         ensure!(
             false,
             "--seed {seed}: this command draws nothing; leave it out, or give it to run, design, measure, reproduce, sweep or challenge new"
@@ -81,6 +85,7 @@ fn dispatch(arguments: &Arguments) -> anyhow::Result<Outcome> {
         Command::Run(options) => run::command(global, options),
         Command::Design(options) => design::command(global, options),
         Command::Measure(options) => measure::command(global, options),
+        Command::Diagnose(options) => diagnose::command(global, options),
         Command::Identify(options) => identify::command(global, options),
         Command::Replay(options) => replay::command(global, options),
         Command::Export(options) => export::command(global, options),

@@ -2,5 +2,6 @@
 //! happen in the physics, and by the analyser, which looks for their signatures; neither knows how the other does it.
 
 pub mod kind;
+pub mod signature;
 
 pub use kind::{Kind, Level, Location};

@@ -600,7 +600,11 @@ impl<'a> Statics<'a> {
             match *effect {
                 Effect::JointCompliance { joint, stiffness } => turn(joint, torque(joint) / stiffness),
                 Effect::WrongPayload { stiffness, .. } => {
-                    (0..q.len()).for_each(|joint| turn(joint, torque(joint) / stiffness));
+                    // The servos add the sag that the believed payload would cause on the rigid arm.
+                    let still = vec![Pose::identity(); q.len() + 1];
+                    let expected = self.wrenches(standing, &still, row.planned.payload_kg);
+                    let about = |wrench: &Wrench, joint| if turns(joint) { wrench.moment.z } else { wrench.force.z };
+                    (0..q.len()).for_each(|joint| turn(joint, (torque(joint) - about(&expected[joint], joint)) / stiffness));
                 }
                 Effect::HardeningStiffness { joint, stiffness, cubic } => {
                     turn(joint, root_of_cubic(stiffness, cubic, torque(joint)));

@@ -25,6 +25,8 @@ pub(super) enum Direction {
 pub(super) enum Law {
     /// A linear spring, N·m/rad.
     Spring { stiffness: f64 },
+    /// The same, and a servo that adds the sag which it expects from the load that it knows of.
+    Compensated { stiffness: f64 },
     /// Load = stiffness · θ + cubic · θ³.
     Hardening { stiffness: f64, cubic: f64 },
     /// A spring of this compliance (rad/(N·m)) with a damper beside it, which yields with this time constant (s).
@@ -41,6 +43,7 @@ impl Law {
         match (self, direction) {
             (Law::Spring { .. }, Direction::Joint) => "joint_compliance",
             (Law::Spring { .. }, _) => "link_bending",
+            (Law::Compensated { .. }, _) => "wrong_payload",
             (Law::Hardening { .. }, _) => "hardening_stiffness",
             (Law::Creep { .. }, _) => "creep_after_motion",
             (Law::LostMotion { .. }, _) => "gravity_lost_motion",

@@ -252,7 +252,7 @@ impl Mechanisms {
                 stiff("stiffness", stiffness)?;
                 self.excess_kg += excess;
                 for joint in 0..kinds.len() {
-                    self.yields(joint, Direction::Joint, Law::Spring { stiffness });
+                    self.yields(joint, Direction::Joint, Law::Compensated { stiffness });
                 }
             }
             Effect::HardeningStiffness { joint, stiffness, cubic } => {

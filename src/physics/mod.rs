@@ -5,7 +5,8 @@
 //!
 //! | effect | mechanism |
 //! |---|---|
-//! | joint compliance, wrong payload | a free coordinate about each joint's axis with rapier's passive spring; the payload is a point mass in the multibody |
+//! | joint compliance | a free coordinate about the joint's axis with rapier's passive spring; the payload is a point mass in the multibody |
+//! | wrong payload | the same in every joint, the springs relaxed where a servo that knows the believed payload would put them |
 //! | hardening stiffness | the same with the tangent of its spring, renewed every step |
 //! | link bending | two springs across the axis (a Cardan joint) at the joint, outboard of its motion |
 //! | creep | a spring and a damper beside it, stepped exactly over each stop of the session |

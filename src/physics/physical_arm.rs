@@ -41,7 +41,7 @@ struct Task {
     /// Way that the motor still has to go when the simulation begins, for each coordinate: signed, rad or m.
     ways: Vec<f64>,
     /// Where each coordinate stood at the end of the move, as far as it creeps.
-    crept: Vec<f64>,
+    told: Vec<f64>,
     dwell_s: f64,
     /// Outputs of the drive trains before loads are mistaken for torque.
     outputs: Vec<f64>,
@@ -78,8 +78,8 @@ impl PhysicalArm {
         let outputs = placement.joints.clone();
         let mut plays = vec![Play::CENTRE; count];
         let mut coordinates = vec![0.0; self.arm.coordinates.len()];
-        let crept = self.crept(conditions);
-        let first = self.holds(&coordinates, &[], &crept, conditions.dwell_s, 0);
+        let told = self.told(conditions);
+        let first = self.holds(&coordinates, &[], &told, conditions.dwell_s, 0);
         self.world.place(&self.arm, &placement, &Yielded { plays: &plays, coordinates: &coordinates, holds: &first });
         let crosstalk = self.arm.drives.iter().any(|drive| drive.crosstalk != 0.0);
         if crosstalk {
@@ -97,7 +97,7 @@ impl PhysicalArm {
             by,
             friction,
             ways: vec![0.0; coordinates.len()],
-            crept,
+            told,
             dwell_s: conditions.dwell_s,
             outputs,
         };
@@ -162,16 +162,17 @@ impl PhysicalArm {
 
     /// Puts everything where `task` wants it after `steps` steps.
     fn put(&mut self, task: &Task, plays: &[Play], coordinates: &[f64], steps: usize) {
-        let holds = self.holds(coordinates, &task.ways, &task.crept, task.dwell_s, steps + 1);
+        let holds = self.holds(coordinates, &task.ways, &task.told, task.dwell_s, steps + 1);
         self.world.place(&self.arm, &task.placement, &Yielded { plays, coordinates, holds: &holds });
     }
 
     /// What holds each coordinate during step number `step`, from 1: a motor has then gone that part of its way.
-    fn holds(&self, coordinates: &[f64], ways: &[f64], crept_to: &[f64], dwell_s: f64, step: usize) -> Vec<Hold> {
+    fn holds(&self, coordinates: &[f64], ways: &[f64], told: &[f64], dwell_s: f64, step: usize) -> Vec<Hold> {
         let hold = |(index, coordinate): (usize, &super::coordinate::Coordinate)| match coordinate.law {
             Law::Spring { stiffness } => Hold::Spring { stiffness, rest: 0.0 },
+            Law::Compensated { stiffness } => Hold::Spring { stiffness, rest: -told[index] / stiffness },
             Law::Hardening { stiffness, cubic } => tangent(stiffness, cubic, coordinates[index]),
-            Law::Creep { compliance, time_constant } => crept(compliance, time_constant, crept_to[index], dwell_s),
+            Law::Creep { compliance, time_constant } => crept(compliance, time_constant, told[index], dwell_s),
             Law::LostMotion { half_width } => Hold::Between { lower: -half_width, upper: half_width },
             Law::Backlash { half_width } => {
                 let left = 1.0 - step.min(DRIVE_STEPS) as f64 / DRIVE_STEPS as f64;
@@ -225,11 +226,17 @@ impl PhysicalArm {
         self.arm.coordinates.iter().map(before).unzip()
     }
 
-    /// Where each coordinate that creeps stood at the end of the last move, after all that was before it in the session: at its
-    /// beginning nothing has crept. Each stop is exact for its own load, without play; moves take no time.
-    fn crept(&self, conditions: &Conditions) -> Vec<f64> {
+    /// What each coordinate's law needs to be told of the conditions. Of one with a compensating servo, the load that this expects
+    /// (N·m): the rigid arm's own, and the payload's as far as the cell knows it. Of one that creeps, where it stood at the end of the
+    /// last move, after all that was before it in the session: at its beginning nothing has crept. Each stop is exact for its own
+    /// load, without play; moves take no time.
+    fn told(&self, conditions: &Conditions) -> Vec<f64> {
         let arrival = conditions.time_s - conditions.dwell_s;
-        let creeps = |coordinate: &super::coordinate::Coordinate| {
+        let told = |coordinate: &super::coordinate::Coordinate| {
+            if let Law::Compensated { .. } = coordinate.law {
+                let believed = Placement { payload_kg: conditions.payload_kg, ..self.arm.placement(conditions) };
+                return static_loads(&self.arm, &believed, &vec![Play::CENTRE; self.arm.joint_count()])[coordinate.joint].along;
+            }
             let Law::Creep { compliance, time_constant } = coordinate.law else {
                 return 0.0;
             };
@@ -257,7 +264,7 @@ impl PhysicalArm {
             }
             state
         };
-        self.arm.coordinates.iter().map(creeps).collect()
+        self.arm.coordinates.iter().map(told).collect()
     }
 
     /// Where statics puts the joints, pressed against the limits as rapier holds them.

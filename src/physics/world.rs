@@ -147,7 +147,7 @@ impl World {
                 // Limits from the start, so that rapier makes room for their constraints.
                 let limits: &[(JointAxis, f64)] = match coordinate.law {
                     Law::LostMotion { half_width } | Law::Backlash { half_width } => &[(axis, half_width)],
-                    Law::Spring { .. } | Law::Hardening { .. } | Law::Creep { .. } => &[],
+                    Law::Spring { .. } | Law::Compensated { .. } | Law::Hardening { .. } | Law::Creep { .. } => &[],
                 };
                 let freedom = builder.freedoms;
                 let mass = if index + 1 == coordinates.len() { mass } else { no_mass };
@@ -409,7 +409,7 @@ impl World {
                     multibody.frictions_mut()[freedom] = friction[index];
                     multibody.damping_mut()[freedom] = TIME_STEP_S * friction[index] / (LEAST_PUSH * half_width);
                 }
-                Law::Spring { .. } | Law::Hardening { .. } | Law::Creep { .. } => {}
+                Law::Spring { .. } | Law::Compensated { .. } | Law::Hardening { .. } | Law::Creep { .. } => {}
             }
         }
     }

@@ -848,3 +848,40 @@ fn sample() {
     println!("{} events, {} messages, {size} bytes", events.len(), recording.message_count);
     println!("written in {written:?}, read in {was_read:?}, compared in {:?}", clock.elapsed());
 }
+
+#[test]
+fn a_measurement_without_conditions_reads_as_without() {
+    let text = r#"{"index":3,"pose_id":2,"role":"held_out","time_s":7.5,"joints":[0.1,-2.0],"position_m":[1.0,2.0,3.0]}"#;
+    let expected = Measurement {
+        index: 3,
+        pose_id: 2,
+        role: Role::HeldOut,
+        time_s: 7.5,
+        joints: vec![0.1, -2.0],
+        position_m: [1.0, 2.0, 3.0],
+        ..Measurement::default()
+    };
+    assert_eq!(serde_json::from_str::<Measurement>(text).unwrap(), expected);
+    // What is absent is not written either, and every key that is has a place in the schema.
+    let schema: Value = serde_json::from_str(include_str!("schemas/measurement.json")).unwrap();
+    let keys = |measurement: &Measurement| -> Vec<String> {
+        let value = serde_json::to_value(measurement).unwrap();
+        value.as_object().unwrap().keys().cloned().collect()
+    };
+    assert_eq!(keys(&expected), ["index", "joints", "pose_id", "position_m", "role", "temperatures_c", "time_s"]);
+    let all = Measurement {
+        attitude_xyzw: Some([0.0, 0.0, 0.0, 1.0]),
+        approach: vec![1, -1],
+        ambient_c: Some(20.0),
+        payload_kg: Some(5.0),
+        dwell_s: Some(2.0),
+        session: Some("1".to_owned()),
+        target: Some("A".to_owned()),
+        ..expected
+    };
+    let mut described: Vec<String> = schema["properties"].as_object().unwrap().keys().cloned().collect();
+    let mut written = keys(&all);
+    described.sort_unstable();
+    written.sort_unstable();
+    assert_eq!(written, described);
+}

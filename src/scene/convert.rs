@@ -534,11 +534,23 @@ fn plan(file: &PlanToml, arm: &Arm) -> Checked<Plan> {
             travel_rad: positive(file.approach_travel_deg, "plan.approach_travel_deg")?.to_radians(),
             travel_m: metres_from_mm(positive(file.approach_travel_mm, "plan.approach_travel_mm")?),
         },
-        dwell_s: at_most(not_negative(file.dwell_s, "plan.dwell_s")?, file.seconds_per_pose, "plan.dwell_s")?,
+        dwell_s: dwell(file)?,
         payloads_kg: payloads(&file.payloads_kg)?,
         payload_blocks: file.payload_blocks,
         temperature: file.temperature.as_ref().map(|file| temperature(file, reference_temperature_c, arm)).transpose()?,
     })
+}
+
+fn dwell(file: &PlanToml) -> Checked<f64> {
+    if not_negative(file.dwell_s, "plan.dwell_s")? <= file.seconds_per_pose {
+        return Ok(file.dwell_s);
+    }
+    Err(Invalid::new(
+        "plan.dwell_s",
+        file.dwell_s.to_string(),
+        format!("seconds_per_pose = {} at most: the next reading comes then", file.seconds_per_pose),
+        "give a smaller number, or raise seconds_per_pose",
+    ))
 }
 
 fn payloads(file: &[f64]) -> Checked<Vec<f64>> {
@@ -546,24 +558,41 @@ fn payloads(file: &[f64]) -> Checked<Vec<f64>> {
     if file.is_empty() {
         return Err(Invalid::new(key, "an empty list", "one mass or more", "write [0] for a tool that carries nothing"));
     }
-    file.iter().map(|mass| at_most(not_negative(*mass, key)?, 1e3, key)).collect()
+    let payload = |(index, mass): (usize, &f64)| {
+        let key = format!("{key}[{}]", index + 1);
+        at_most(not_negative(*mass, &key)?, 1e3, &key)
+    };
+    file.iter().enumerate().map(payload).collect()
 }
 
 /// 0 K in °C.
 const ABSOLUTE_ZERO_C: f64 = -273.15;
 
 fn temperature(file: &TemperatureToml, reference_c: f64, arm: &Arm) -> Checked<Temperature> {
-    let warm_enough = |rise: f64, key: &str| {
+    let warm_enough = |rise: f64, of: &str, key: &str| {
         if reference_c + rise > ABSOLUTE_ZERO_C {
             return Ok(rise);
         }
-        let found = format!("{rise}, which makes {} °C", reference_c + rise);
+        let found = format!("{rise}, which makes {} °C of {of}", reference_c + rise);
         Err(Invalid::new(
             key,
             found,
             format!("more than {}", ABSOLUTE_ZERO_C - reference_c),
             "there is nothing below absolute zero",
         ))
+    };
+    // Lists are base link first, keys count from 1 and links from the base, which is 0.
+    let of_link = |values: &OneOrEach, index: usize, key: &str| match values {
+        OneOrEach::One(_) => (key.to_owned(), "every link".to_owned()),
+        OneOrEach::Each(_) => (format!("{key}[{}]", index + 1), format!("link {index}")),
+    };
+    let rise = |(index, rise): (usize, f64)| {
+        let (key, link) = of_link(&file.rise_k, index, "plan.temperature.rise_k");
+        warm_enough(rise, &link, &key)
+    };
+    let lag = |(index, lag): (usize, f64)| {
+        let (key, _) = of_link(&file.lag_s, index, "plan.temperature.lag_s");
+        at_most(not_negative(lag, &key)?, 1e6, &key)
     };
     let rise_k = each_link(&file.rise_k, "plan.temperature.rise_k", arm)?;
     let lag_s = each_link(&file.lag_s, "plan.temperature.lag_s", arm)?;
@@ -573,12 +602,9 @@ fn temperature(file: &TemperatureToml, reference_c: f64, arm: &Arm) -> Checked<T
             ThermalProfileToml::WarmUp => ThermalProfile::WarmUp,
             ThermalProfileToml::HeatAndCool => ThermalProfile::HeatAndCool,
         },
-        rise_k: rise_k.into_iter().map(|rise| warm_enough(rise, "plan.temperature.rise_k")).collect::<Checked<_>>()?,
-        lag_s: lag_s
-            .into_iter()
-            .map(|lag| at_most(not_negative(lag, "plan.temperature.lag_s")?, 1e6, "plan.temperature.lag_s"))
-            .collect::<Checked<_>>()?,
-        ambient_rise_k: warm_enough(file.ambient_rise_k, "plan.temperature.ambient_rise_k")?,
+        rise_k: rise_k.into_iter().enumerate().map(rise).collect::<Checked<_>>()?,
+        lag_s: lag_s.into_iter().enumerate().map(lag).collect::<Checked<_>>()?,
+        ambient_rise_k: warm_enough(file.ambient_rise_k, "the air", "plan.temperature.ambient_rise_k")?,
     })
 }
 

@@ -172,7 +172,8 @@ pub enum Effect {
         /// Way over which the memory fades, rad.
         travel: f64,
     },
-    /// Not in the analyser's library: the payload weighs more than the cell believes, on an arm whose joints yield.
+    /// Not in the analyser's library: the payload weighs more than the cell believes, on an arm whose joints yield and whose servos
+    /// compensate the sag that they expect: what is left is what the excess does.
     WrongPayload {
         /// True minus recorded mass, kg.
         excess: f64,

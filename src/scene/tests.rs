@@ -121,6 +121,39 @@ fn what_is_wrong_is_named_with_line_key_and_remedy() {
         ("name = \"arm8\"", 0, "name = \"Arm 8\"", &["name", "\"Arm 8\"", "a-z 0-9 - _"]),
         ("inertia = [0.4, 0.95]", 0, "inertia = [0.95, 0.4]", &["design.swarm.inertia", "put the smaller one first"]),
         ("seconds_per_pose = 20", 0, "seconds_per_pose = 0", &["plan.seconds_per_pose", "more than 0"]),
+        ("# repeats = 2", 0, "repeats = 0", &["plan.repeats", "1 or more, 1000 at most"]),
+        ("# repeats = 2", 0, "repeats = 1001", &["plan.repeats", "1001", "1000 at most"]),
+        ("# repeats = 2", 0, "dwell_s = 21", &["plan.dwell_s", "21", "seconds_per_pose = 20 at most"]),
+        ("# repeats = 2", 0, "dwell_s = -1", &["plan.dwell_s", "0 or more"]),
+        ("# approach = \"random\"", 0, "approach = \"sideways\"", &["plan.approach", "direct, up, down, alternate, random"]),
+        ("# approach = \"random\"", 0, "approach_travel_deg = 0", &["plan.approach_travel_deg", "more than 0"]),
+        ("# approach = \"random\"", 0, "approach_travel_mm = -5", &["plan.approach_travel_mm", "more than 0"]),
+        ("# approach = \"random\"", 0, "approach_travel = 5", &["did you mean `approach_travel_"]),
+        ("# payloads_kg = [0, 5]", 0, "payloads_kg = []", &["plan.payloads_kg", "an empty list", "[0]"]),
+        ("# payloads_kg = [0, 5]", 0, "payloads_kg = [0, -5]", &["plan.payloads_kg[2]", "-5", "0 or more"]),
+        ("# payloads_kg = [0, 5]", 0, "payloads_kg = [0, 1001]", &["plan.payloads_kg[2]", "1000 at most"]),
+        ("# payloads_kg = [0, 5]", 0, "payload_blocks = 1", &["plan.payload_blocks", "a boolean"]),
+        (
+            "rise_k = [3, 8,",
+            0,
+            "rise_k = [3, -293.5,",
+            &["plan.temperature.rise_k[2]", "-293.5", "of link 1", "more than -293.15"],
+        ),
+        ("rise_k = [3, 8, 10, 10, 9, 8, 7, 6, 5]", 0, "rise_k = -300", &["plan.temperature.rise_k", "of every link"]),
+        ("profile = \"heat", 0, "lag_s = -1\nprofile = \"heat", &["plan.temperature.lag_s", "0 or more"]),
+        ("profile = \"heat", 0, "lag_s = [1, 2]\nprofile = \"heat", &["plan.temperature.lag_s", "one number, or 9"]),
+        (
+            "profile = \"heat",
+            0,
+            "lag_s = [0, 0, 0, 0, 0, 0, 0, 0, -2]\nprofile = \"heat",
+            &["plan.temperature.lag_s[9]", "-2", "0 or more"],
+        ),
+        (
+            "profile = \"heat",
+            0,
+            "ambient_rise_k = -300\nprofile = \"heat",
+            &["plan.temperature.ambient_rise_k", "of the air", "more than -293.15"],
+        ),
         // The hidden section.
         ("joint = \"joint4\"", 0, "joint = \"joint9\"", &["injected.effect[2].joint", "\"joint9\"", "joint7, joint8"]),
         ("tilt_urad = 100", 2, "tilt_urad = -1", &["injected.effect[3].tilt_urad", "0 or more"]),
@@ -333,6 +366,42 @@ fn optional_parts_are_read() {
     assert_eq!(injected.parameter_errors[1].1, -0.3e-3);
     // Positions only: three equations each.
     assert!(message(&text.replacen("count = 40", "count = 16", 1)).contains("17 or more: a position gives 3 equations"));
+}
+
+#[test]
+fn a_plan_is_read_and_its_defaults_are_what_was_before() {
+    let [(arm8, _), (paper, _)] = shipped();
+    let plan = &paper.scene.plan;
+    assert_eq!((plan.repeats, plan.dwell_s, plan.payload_blocks), (1, 0.0, false));
+    assert_eq!((plan.payloads_kg.as_slice(), plan.approach.policy), (&[0.0][..], ApproachPolicy::Direct));
+    assert_eq!(plan.temperature, None);
+
+    let mut file = arm8;
+    for (key, value) in [
+        ("plan.repeats", "3"),
+        ("plan.approach", "\"alternate\""),
+        ("plan.approach_travel_deg", "18"),
+        ("plan.approach_travel_mm", "2"),
+        ("plan.dwell_s", "20"),
+        ("plan.payloads_kg", "[0, 2.5]"),
+        ("plan.payload_blocks", "true"),
+        ("plan.temperature", "{ profile = \"warm-up\", rise_k = 4, lag_s = [0, 1, 2, 3, 4, 5, 6, 7, 8], ambient_rise_k = 1.5 }"),
+    ] {
+        file.set(key, value).unwrap_or_else(|error| panic!("{error}"));
+    }
+    let plan = &file.scene.plan;
+    assert_eq!((plan.repeats, plan.dwell_s, plan.payload_blocks, &plan.payloads_kg), (3, 20.0, true, &vec![0.0, 2.5]));
+    let approach = Approach { policy: ApproachPolicy::Alternate, travel_rad: 18f64.to_radians(), travel_m: 0.002 };
+    assert_eq!(plan.approach, approach);
+    let temperature = Temperature {
+        profile: ThermalProfile::WarmUp,
+        rise_k: vec![4.0; 9],
+        lag_s: (0..9).map(f64::from).collect(),
+        ambient_rise_k: 1.5,
+    };
+    assert_eq!(plan.temperature, Some(temperature));
+    let public = file.public_toml().expect("it can be written");
+    assert_eq!(parse(&public, "public").unwrap_or_else(|error| panic!("{error}")).scene, file.scene);
 }
 
 fn configuration(arm: &Arm, stream: &mut Stream) -> Vec<f64> {

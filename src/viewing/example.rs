@@ -203,6 +203,10 @@ fn events(particles: usize, count: usize, iterations: usize, held_out: usize) ->
             position_m: measured.translation.vector.into(),
             attitude_xyzw: Some([q.i, q.j, q.k, q.w]),
             joints: joints.clone(),
+            approach: (0..JOINTS).map(|joint| if (index + joint) % 2 == 0 { 1 } else { -1 }).collect(),
+            ambient_c: Some(21.0 + 0.02 * index as f64),
+            payload_kg: Some(if index % 2 == 0 { 0.0 } else { 5.0 }),
+            dwell_s: Some(2.0),
             ..Measurement::default()
         }));
         let six = |predicted: &Pose| -> [f64; 6] { pose_error(&measured, predicted).into() };
@@ -340,6 +344,9 @@ fn a_run_is_written_to_a_file() {
     let bytes = std::fs::read(&path).unwrap();
     assert!(bytes.len() > 100_000, "{} bytes", bytes.len());
     assert_eq!(&bytes[..3], b"RRF", "the mark of a Rerun file");
+    for path in ["/temperatures/air", "/conditions/payload", "/conditions/approach"] {
+        assert!(bytes.windows(path.len()).any(|window| window == path.as_bytes()), "{path}");
+    }
 }
 
 #[test]

@@ -209,7 +209,13 @@ fn tree(parts: Parts, camera: Camera, joints: usize) -> Node {
     let attitude = error_chart("Attitude error", "/errors/attitude/**");
     let by_joint =
         || drawing("What is left, joint by joint: came up (amber), down (blue)", "/errors/by_joint/**", by_joint::bounds(joints));
-    let temperatures = plot("Temperatures, °C", &["/temperatures/**"], true);
+    let conditions = || {
+        vec![
+            plot("Temperatures, °C", &["/temperatures/**"], true),
+            plot("Payload, kg", &["/conditions/payload/**"], true),
+            plot("Approach: each joint at its number, up or down", &["/conditions/approach/**"], true),
+        ]
+    };
     let side = tabs(vec![summary, notes]);
     match (parts.choosing, parts.measured) {
         (Choosing::Swarm(words), false) => columns(vec![
@@ -220,18 +226,21 @@ fn tree(parts: Parts, camera: Camera, joints: usize) -> Node {
         (Choosing::Swarm(words), true) => columns(vec![
             (4.0, rows(vec![(10.0, cell), (5.0, indexes()), (4.0, fitness(words))])),
             (4.0, rows(vec![(1.0, residuals()), (1.0, tabs(vec![swarm(), by_joint()]))])),
-            (3.0, rows(vec![(2.0, side), (1.0, tabs(vec![position, attitude, temperatures]))])),
+            (3.0, rows(vec![(2.0, side), (1.0, tabs([position, attitude].into_iter().chain(conditions()).collect()))])),
         ]),
         (Choosing::Search(words), false) => columns(vec![(2.0, rows(vec![(3.0, cell), (2.0, search(words))])), (1.0, side)]),
         (Choosing::Search(words), true) => columns(vec![
             (4.0, rows(vec![(10.0, cell), (6.0, search(words))])),
             (4.0, rows(vec![(10.0, residuals()), (6.0, tabs(vec![by_joint(), position, attitude]))])),
-            (3.0, rows(vec![(2.0, side), (1.0, temperatures)])),
+            (3.0, rows(vec![(2.0, side), (1.0, tabs(conditions()))])),
         ]),
         (Choosing::Not, _) => {
             let scenes = columns(vec![(1.0, cell), (1.0, residuals())]);
             let charts = columns(vec![(3.0, by_joint()), (2.0, tabs(vec![position, attitude]))]);
-            columns(vec![(8.0, rows(vec![(5.0, scenes), (3.0, charts)])), (3.0, rows(vec![(2.0, side), (1.0, temperatures)]))])
+            columns(vec![
+                (8.0, rows(vec![(5.0, scenes), (3.0, charts)])),
+                (3.0, rows(vec![(2.0, side), (1.0, tabs(conditions()))])),
+            ])
         }
     }
 }

@@ -74,6 +74,7 @@ pub(super) struct Picture {
     roles: BTreeMap<usize, Role>,
     series_named: bool,
     temperatures_named: bool,
+    conditions_named: bool,
     /// Whether the chart and the arrows lag behind the measurements.
     stale: bool,
 }
@@ -95,6 +96,7 @@ impl Picture {
             roles: BTreeMap::new(),
             series_named: false,
             temperatures_named: false,
+            conditions_named: false,
             stale: false,
         })
     }
@@ -326,6 +328,7 @@ impl Picture {
             }
             stream.log("temperatures", &Scalars::new(measurement.temperatures_c.iter().copied()))?;
         }
+        self.conditions(stream, measurement)?;
         // Chart and arrows are drawn anew, ever more rarely, so that the work stays in proportion to the measurements.
         let count = self.measured.len();
         self.stale = true;
@@ -334,6 +337,29 @@ impl Picture {
         }
         self.summary.measured(measurement);
         self.measurements.push(measurement.clone());
+        Ok(())
+    }
+
+    /// Temperature of the air, payload, and where each joint came from.
+    fn conditions(&mut self, stream: &RecordingStream, measurement: &Measurement) -> RecordingStreamResult<()> {
+        if !self.conditions_named {
+            self.conditions_named = true;
+            stream.log_static("temperatures/air", &SeriesLines::new().with_names(["air"]))?;
+            stream.log_static("conditions/payload", &SeriesLines::new().with_names(["payload"]))?;
+            let joints = self.body.arm().chain.joints.iter().map(|joint| joint.name.as_str());
+            stream.log_static("conditions/approach", &SeriesLines::new().with_names(joints.collect::<Vec<_>>()))?;
+        }
+        if let Some(ambient_c) = measurement.ambient_c {
+            stream.log("temperatures/air", &Scalars::new([ambient_c]))?;
+        }
+        if let Some(payload_kg) = measurement.payload_kg {
+            stream.log("conditions/payload", &Scalars::new([payload_kg]))?;
+        }
+        if !measurement.approach.is_empty() {
+            // Each joint on a line of its own, at its number: above it where the joint came upwards.
+            let place = |(joint, direction): (usize, &i8)| joint as f64 + 1.0 + 0.3 * f64::from(*direction);
+            stream.log("conditions/approach", &Scalars::new(measurement.approach.iter().enumerate().map(place)))?;
+        }
         Ok(())
     }
 

@@ -95,3 +95,61 @@ fn the_exported_scene_repeats_the_design() {
         refused.stderr
     );
 }
+
+/// A session as one plans it: repeats, payloads, a side to come from. Its recording, its table and its replay know of it.
+#[test]
+fn a_planned_session_is_measured_exported_identified_and_replayed() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    let path = |name: &str| out.join(name).to_str().unwrap().to_owned();
+    kincal(out, &[&["design", "scenes/arm8.toml"], &QUICK[..]].concat()).ends(0);
+    let (designed, recording, truth) = (path("arm8-design.mcap"), path("arm8-measure.mcap"), path("arm8-measure.truth.toml"));
+    let measure = [&["measure", "scenes/arm8.toml", "--design", &designed, "--json"], &QUICK[..]].concat();
+    let note = "the noise cannot be estimated";
+    let once = kincal(out, &measure).ends(0);
+    assert!(once.stderr.contains(note), "{}", once.stderr);
+    let plan = [
+        "plan.repeats=2",
+        "plan.approach=\"random\"",
+        "plan.payloads_kg=[0, 5]",
+        "plan.payload_blocks=true",
+        "plan.dwell_s=2",
+        "plan.temperature.lag_s=300",
+        "plan.temperature.ambient_rise_k=2",
+    ];
+    let planned = [&measure[..], &plan.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()].concat();
+    let measured = kincal(out, &planned).ends(0);
+    assert!(!measured.stderr.contains(note), "{}", measured.stderr);
+    assert_eq!(measured.json()["poses"], 180);
+
+    kincal(out, &["export", &recording, "--to", "csv"]).ends(0);
+    let table = fs::read_to_string(path("arm8-measure.csv")).unwrap();
+    let mut rows = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let header = rows.next().unwrap();
+    let rows: Vec<Vec<&str>> = rows.collect();
+    let column = |name: &str| {
+        let at = header.iter().position(|column| *column == name).unwrap_or_else(|| panic!("no {name} in {header:?}"));
+        rows.iter().map(move |row| row[at]).collect::<Vec<_>>()
+    };
+    assert_eq!(rows.len(), 180);
+    assert_eq!(column("payload_kg"), [["0"; 90], ["5"; 90]].concat());
+    assert!(column("dwell_s").iter().all(|dwell| *dwell == "2"));
+    for joint in 1..=8 {
+        let ups = column(&format!("approach{joint}")).iter().filter(|direction| **direction == "1").count();
+        // Pairs of repeats: 90 coins, five sigma.
+        assert!((90 - 48..=90 + 48).contains(&ups), "{ups} of 180");
+    }
+    let air: Vec<f64> = column("temp_ambient_c").iter().map(|air| air.parse().unwrap()).collect();
+    // Noise of 0.1 K.
+    assert!((air[0] - 20.0).abs() < 0.6 && (air[90] - 22.0).abs() < 0.6 && (air[179] - 20.0).abs() < 0.6, "{air:?}");
+    let mut pose_ids: Vec<usize> = column("pose_id").iter().map(|id| id.parse().unwrap()).collect();
+    pose_ids.sort_unstable();
+    assert_eq!(pose_ids, (0..180).map(|row| row / 2).collect::<Vec<_>>());
+
+    kincal(out, &["export", "scenes/arm8.toml", "--to", "urdf"]).ends(0);
+    let identified = kincal(out, &["identify", &path("arm8-measure.csv"), "--robot", &path("arm8.urdf"), "--json"]).ends(0);
+    assert!(identified.stderr.contains("an identification does not use approach1"), "{}", identified.stderr);
+    assert_eq!(identified.json()["held_out"]["count"], 100);
+    kincal(out, &["replay", &recording]).ends(0);
+    kincal(out, &["replay", &recording, "--truth", &truth]).ends(0);
+}

@@ -330,11 +330,7 @@ fn of_foreign(truths: &[CaseTruth], verdicts: &[Verdict], foreign: &dyn Fn(&True
             continue;
         };
         let row = usize::from(effect.lambda.is_some_and(|lambda| lambda >= FLAGGED_FROM));
-        // A payload that is wrong shows because every joint yields: who says that they do is not wrong.
-        let yields = truth.effects.iter().any(|effect| effect.kind == "wrong_payload");
-        let there = |kind: &str| {
-            truth.effects.iter().any(|effect| !foreign(effect) && effect.kind == kind) || yields && kind == "joint_compliance"
-        };
+        let there = |kind: &str| truth.effects.iter().any(|effect| !foreign(effect) && effect.kind == kind);
         let misnamed = named(verdict).iter().any(|claim| !there(&claim.kind));
         for row in [row, 2] {
             rows[row].cases += 1;

@@ -1,0 +1,88 @@
+//! `kincal diagnose`: what causes what a calibration leaves.
+
+use anyhow::{Context, bail};
+
+use super::Outcome;
+use super::arguments::{DiagnoseOptions, Global};
+use super::{input, output};
+use crate::arm::Arm;
+use crate::diagnosis::outcome::{NoiseSource, Verdict};
+use crate::diagnosis::{self, Options};
+use crate::effects::Kind;
+use crate::measurement::{Measurement, Sensor, table};
+use crate::recording::event::RealCell;
+use crate::{report, scene, session};
+
+pub(crate) fn command(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Outcome> {
+    let mut without = Vec::new();
+    for name in &options.without {
+        let Some(kind) = Kind::from_name(name) else {
+            let known: Vec<&str> = Kind::ALL.iter().map(|kind| kind.name()).collect();
+            bail!("--without {name}: no such kind; known are {}", known.join(", "));
+        };
+        without.push(kind);
+    }
+    let subject = subject(global, options)?;
+    let rows: Vec<&Measurement> = subject.measurements.iter().collect();
+    let options_of_diagnosis = Options { noise: subject.noise, without };
+    let mut diagnosis = diagnosis::diagnose(&subject.arm, &subject.sensor, &rows, &options_of_diagnosis)
+        .with_context(|| options.input.display().to_string())?;
+    diagnosis.notes.extend(subject.notes);
+    output::show(global, &report::diagnosis::text(&diagnosis))?;
+    output::show_json(global, &serde_json::to_value(&diagnosis)?)?;
+    // A gap that nobody can explain is a bad answer; that nothing could be seen is none at all.
+    Ok(match diagnosis.verdict {
+        Verdict::NoGap | Verdict::Explained => Outcome::Good,
+        Verdict::Ambiguous | Verdict::UnknownRemains | Verdict::NotDetectable => Outcome::Bad,
+    })
+}
+
+/// What is diagnosed.
+struct Subject {
+    arm: Arm,
+    sensor: Sensor,
+    noise: NoiseSource,
+    measurements: Vec<Measurement>,
+    notes: Vec<String>,
+}
+
+fn subject(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Subject> {
+    if input::is_recording(&options.input) {
+        input::no_robot(&options.robot)?;
+        let (start, measurements) = input::recorded(global, &options.input, options.partial)?;
+        return match &start.real {
+            Some(real) => {
+                let (arm, notes) = session::real_robot(&start, real).with_context(|| options.input.display().to_string())?;
+                let sensor = sensor(real, &measurements);
+                Ok(Subject { arm, sensor, noise: NoiseSource::Declared, measurements, notes })
+            }
+            None => {
+                let scene = scene::parse(&start.scene, &format!("{} (scene)", options.input.display()))?.scene;
+                let noise = NoiseSource::Declared;
+                Ok(Subject { arm: scene.arm, sensor: scene.sensor, noise, measurements, notes: scene.urdf_notes })
+            }
+        };
+    }
+    let robot = input::robot_of_table(&options.input, &options.robot)?;
+    let (start, real) = input::described("diagnose", robot, &options.robot)?;
+    let table = table::read(&options.input)?;
+    let (arm, notes) = session::real_robot(&start, &real).with_context(|| robot.display().to_string())?;
+    input::check_units(&options.input, &table, &arm)?;
+    input::check_joints(&options.input, &table.measurements, arm.joint_count())?;
+    let noise = if options.robot.position_noise_um.is_some() { NoiseSource::Declared } else { NoiseSource::Assumed };
+    let sensor = sensor(&real, &table.measurements);
+    Ok(Subject { arm, sensor, noise, measurements: table.measurements, notes })
+}
+
+/// The sensor of a real cell: as declared, attitudes where all rows have them.
+fn sensor(real: &RealCell, measurements: &[Measurement]) -> Sensor {
+    let attitude = measurements.iter().all(|measurement| measurement.attitude_xyzw.is_some());
+    Sensor {
+        position_in_base: nalgebra::Point3::origin(),
+        position_sigma_m: real.position_sigma_m,
+        position_sigma_per_m: 0.0,
+        attitude_sigma_rad: attitude.then_some(real.attitude_sigma_rad),
+        temperature_sigma_k: None,
+        view: None,
+    }
+}

@@ -1,0 +1,141 @@
+//! What commands that take measurements share: recordings, tables, and the robot that a table is of.
+
+use std::path::Path;
+
+use anyhow::{Context, bail, ensure};
+
+use super::arguments::{Global, RobotOptions};
+use super::output;
+use crate::arm::Arm;
+use crate::kinematics::{JointKind, urdf};
+use crate::measurement::{Measurement, table};
+use crate::recording::event::{Event, RealCell, Start};
+use crate::{recording, scene, session};
+
+/// Position noise that is assumed where none is declared, µm.
+pub(crate) const POSITION_NOISE_UM: f64 = 20.0;
+/// Attitude noise that is assumed where none is declared, degrees.
+pub(crate) const ATTITUDE_NOISE_DEG: f64 = 0.005;
+
+/// The first event and the measurements of a recording.
+pub(crate) fn recorded(global: &Global, path: &Path, partial: bool) -> anyhow::Result<(Start, Vec<Measurement>)> {
+    let recording = recording::read::read(path)?;
+    if let Some(cut) = &recording.cut {
+        if !partial {
+            bail!("{cut}; --partial uses what is there");
+        }
+        output::note(global, &format!("note: {cut}"));
+    }
+    if let Some(warning) = &recording.version_warning {
+        output::note(global, &format!("note: {warning}"));
+    }
+    let measurements: Vec<Measurement> = recording
+        .events
+        .into_iter()
+        .filter_map(|event| match event {
+            Event::Measured(measurement) => Some(measurement),
+            _ => None,
+        })
+        .collect();
+    ensure!(
+        !measurements.is_empty(),
+        "{} holds no measurements; make some with `kincal measure` or `kincal run`",
+        path.display()
+    );
+    Ok((recording.start, measurements))
+}
+
+/// The first event of a table's recording: the robot as its file stands, and the sensor as declared.
+pub(crate) fn described(command: &str, robot: &Path, options: &RobotOptions) -> anyhow::Result<(Start, RealCell)> {
+    let is_scene = robot.extension().is_some_and(|extension| extension == "toml");
+    let scene = if is_scene { scene::read(robot)?.public_toml()? } else { String::new() };
+    let urdf = if is_scene {
+        None
+    } else {
+        // Read as a file first: its errors name lines.
+        urdf::read(robot, options.base_link.as_deref(), options.tip_link.as_deref())?;
+        Some(std::fs::read_to_string(robot).with_context(|| robot.display().to_string())?)
+    };
+    let real = RealCell {
+        urdf,
+        base_link: options.base_link.clone(),
+        tip_link: options.tip_link.clone(),
+        position_sigma_m: options.position_noise_um.unwrap_or(POSITION_NOISE_UM) * 1e-6,
+        attitude_sigma_rad: options.attitude_noise_deg.unwrap_or(ATTITUDE_NOISE_DEG).to_radians(),
+    };
+    Ok((Start { real: Some(real.clone()), ..session::start_event(command, &scene) }, real))
+}
+
+/// Refuses lengths for joints that turn and angles for joints that slide.
+pub(crate) fn check_units(path: &Path, table: &table::Table, arm: &Arm) -> anyhow::Result<()> {
+    for (number, (is_length, joint)) in table.joint_is_length.iter().zip(&arm.chain.joints).enumerate() {
+        let slides = joint.kind == JointKind::Prismatic;
+        let (verb, units) = if slides { ("slides", "_m or _mm") } else { ("turns", "_rad or _deg") };
+        ensure!(
+            *is_length == slides,
+            "{}: column q{} has the unit of {}, but joint `{}` of the robot {verb}: its column must end in {units}",
+            path.display(),
+            number + 1,
+            if *is_length { "a length" } else { "an angle" },
+            joint.name
+        );
+    }
+    Ok(())
+}
+
+pub(crate) fn check_joints(path: &Path, measurements: &[Measurement], joint_count: usize) -> anyhow::Result<()> {
+    let found = measurements.iter().map(|row| row.joints.len()).find(|found| *found != joint_count).unwrap_or(joint_count);
+    ensure!(
+        found == joint_count,
+        "{} has {found} joint columns, the robot has {joint_count} joints: is it the right robot, and are its links from --base-link \
+         to --tip-link?",
+        path.display()
+    );
+    Ok(())
+}
+
+/// Refuses `--base-link` and `--tip-link` where they would do nothing.
+pub(crate) fn no_links(options: &RobotOptions, why: &str) -> anyhow::Result<()> {
+    for (name, link) in [("--base-link", &options.base_link), ("--tip-link", &options.tip_link)] {
+        ensure!(link.is_none(), "{name} {}: {why}", link.as_deref().unwrap_or_default());
+    }
+    Ok(())
+}
+
+/// Refuses a robot beside a recording, which has its own.
+pub(crate) fn no_robot(options: &RobotOptions) -> anyhow::Result<()> {
+    no_links(options, "a recording carries its own nominal arm; leave it out")?;
+    ensure!(
+        options.robot.is_none(),
+        "--robot {}: a recording carries its own nominal arm; give --robot with a table (.csv) only",
+        options.robot.as_deref().unwrap_or(Path::new("")).display()
+    );
+    Ok(())
+}
+
+/// The nominal robot of a table.
+pub(crate) fn robot_of_table<'a>(input: &Path, options: &'a RobotOptions) -> anyhow::Result<&'a Path> {
+    let Some(robot) = &options.robot else {
+        bail!("{} is a table: give its nominal robot with --robot FILE (a URDF or a scene)", input.display());
+    };
+    if robot.extension().is_some_and(|extension| extension == "toml") {
+        no_links(options, "the arm of a scene is taken whole; leave it out or give a URDF")?;
+    }
+    for (name, value) in
+        [("--position-noise-um", options.position_noise_um), ("--attitude-noise-deg", options.attitude_noise_deg)]
+    {
+        if let Some(value) = value {
+            ensure!((1e-6..=1e6).contains(&value), "{name} {value}: a positive number is needed, from 0.000001 to 1000000");
+        }
+    }
+    Ok(robot)
+}
+
+pub(crate) fn is_recording(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "mcap")
+}
+
+pub(crate) fn input_stem(path: &Path, suffix: &str) -> String {
+    let stem = path.file_stem().map_or_else(|| "input".to_owned(), |stem| stem.to_string_lossy().into_owned());
+    format!("{stem}{suffix}")
+}

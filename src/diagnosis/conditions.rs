@@ -1,0 +1,166 @@
+//! Conditions of each row, as far as they were recorded, and what follows from what is missing.
+
+use nalgebra::Vector3;
+
+use super::rows::Rows;
+use crate::effects::signature::library::Columns;
+use crate::effects::signature::shape::{FORGETTING_S, MEMORIES, Reading};
+use crate::measurement::Measurement;
+
+/// Change points tried at most.
+const CHANGES: usize = 80;
+
+/// Rows as signatures see them, and what the data have.
+#[derive(Clone, Debug)]
+pub struct Conditions {
+    /// Of each row.
+    pub readings: Vec<Reading>,
+    /// What there is.
+    pub columns: Columns,
+    /// What is missing.
+    pub notes: Vec<String>,
+    /// Time of each place in time, s.
+    pub times: Vec<f64>,
+}
+
+/// The conditions of `measurements`, whose geometry is `rows`.
+#[must_use]
+pub fn conditions(measurements: &[&Measurement], rows: &Rows) -> Conditions {
+    let mut notes = Vec::new();
+    let count = rows.mechanism.joint_count();
+    let total = measurements.len();
+    let mut in_time: Vec<usize> = (0..total).collect();
+    in_time.sort_by(|a, b| measurements[*a].time_s.total_cmp(&measurements[*b].time_s).then(a.cmp(b)));
+    let mut order = vec![0; total];
+    for (place, row) in in_time.iter().enumerate() {
+        order[*row] = place;
+    }
+    let times: Vec<f64> = in_time.iter().map(|row| measurements[*row].time_s).collect();
+    let (begin, end) = (times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0));
+    let time = end > begin;
+
+    let approach = measurements.iter().all(|row| row.approach.len() == count);
+    if !approach {
+        notes.push("no approach directions: backlash cannot be looked for".to_owned());
+    }
+    let links = measurements.iter().all(|row| row.temperatures_c.len() >= count);
+    let ambient = measurements.iter().all(|row| row.ambient_c.is_some());
+    let mut temperature = links || ambient;
+    if !links && ambient {
+        notes.push("no temperatures of the links: that of the air stands in for all of them".to_owned());
+    }
+    let temperatures = |row: &Measurement| -> (Vec<f64>, f64) {
+        if links {
+            let foot = row.ambient_c.unwrap_or(row.temperatures_c[0]);
+            (row.temperatures_c[..count].to_vec(), foot)
+        } else {
+            let air = row.ambient_c.unwrap_or(0.0);
+            (vec![air; count], air)
+        }
+    };
+    let reference = in_time.first().filter(|_| temperature).map(|row| temperatures(measurements[*row]));
+    if temperature {
+        let mut spread: f64 = 0.0;
+        for row in measurements {
+            let (links, _) = temperatures(row);
+            if let Some((reference, _)) = &reference {
+                spread = links.iter().zip(reference).fold(spread, |most, (now, then)| most.max((now - then).abs()));
+            }
+        }
+        if spread < 0.05 {
+            temperature = false;
+            notes.push("the temperature never changes: thermal effects cannot be looked for".to_owned());
+        }
+    } else {
+        notes.push("no temperatures: thermal effects cannot be looked for".to_owned());
+    }
+    if measurements.iter().all(|row| row.payload_kg.is_none()) {
+        notes.push("no payload column: the arm is taken to carry nothing".to_owned());
+    }
+    if !rows.mechanism.masses_known {
+        notes.push(
+            "the robot's file has no masses: each link is taken to weigh 1 kg in its middle, and magnitudes that are driven by load \
+             have no physical unit"
+                .to_owned(),
+        );
+    }
+
+    let mut readings: Vec<Reading> = Vec::with_capacity(total);
+    for (row, measurement) in measurements.iter().enumerate() {
+        let (rise_k, foot_rise_k) = match (&reference, temperature) {
+            (Some((reference, foot)), true) => {
+                let (now, now_foot) = temperatures(measurement);
+                (now.iter().zip(reference).map(|(now, then)| now - then).collect(), now_foot - foot)
+            }
+            _ => (Vec::new(), 0.0),
+        };
+        readings.push(Reading {
+            posture: rows.postures[row].clone(),
+            joints: measurement.joints.clone(),
+            slides: rows.mechanism.slides.clone(),
+            target: rows.targets[row],
+            approach: if approach { measurement.approach.iter().map(|sign| f64::from(*sign)).collect() } else { Vec::new() },
+            rise_k,
+            foot_rise_k,
+            share: if time { (measurement.time_s - begin) / (end - begin) } else { 0.0 },
+            order: order[row],
+            torque_memory: vec![[0.0; FORGETTING_S.len()]; count],
+            gravity: rows.mechanism.gravity,
+            memory: vec![[0.0; MEMORIES.len()]; count],
+        });
+    }
+    // What came before, in time.
+    let mut memory = vec![[0.0; MEMORIES.len()]; count];
+    for place in 0..total {
+        let row = in_time[place];
+        if let Some(before) = place.checked_sub(1).map(|before| in_time[before]) {
+            let pause = measurements[row].time_s - measurements[before].time_s;
+            for joint in 0..count {
+                let torque = readings[row].posture.torque(joint);
+                for (which, time) in FORGETTING_S.iter().enumerate() {
+                    let kept = libm::exp(-pause.max(0.0) / time);
+                    readings[row].torque_memory[joint][which] =
+                        readings[before].torque_memory[joint][which] * kept + torque * (1.0 - kept);
+                }
+                let way = readings[row].joints[joint] - readings[before].joints[joint];
+                // Where the last move's direction is known it may not be that of the whole way.
+                let sign = if way == 0.0 { 0.0 } else { way.signum() };
+                for (memory, length) in memory[joint].iter_mut().zip(MEMORIES) {
+                    let kept = libm::exp(-way.abs() / length);
+                    *memory = *memory * kept - sign * (1.0 - kept);
+                }
+                readings[row].memory[joint] = memory[joint];
+            }
+        } else {
+            for joint in 0..count {
+                readings[row].torque_memory[joint] = [readings[row].posture.torque(joint); FORGETTING_S.len()];
+            }
+        }
+    }
+    let travel = (0..count)
+        .map(|joint| {
+            let values = measurements.iter().map(|row| row.joints[joint]);
+            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
+        })
+        .collect();
+    let margin = (total / 10).max(3);
+    let span = total.saturating_sub(2 * margin);
+    let stride = span.div_ceil(CHANGES).max(1);
+    let changes = (margin..total.saturating_sub(margin)).step_by(stride).collect();
+    let columns = Columns {
+        approach,
+        temperature,
+        attitude: rows.per_row == 6,
+        time,
+        rows: total,
+        travel,
+        changes: if time { changes } else { Vec::new() },
+    };
+    Conditions { readings, columns, notes, times }
+}
+
+/// Mean of vectors; zero where there are none.
+#[must_use]
+pub fn centre(points: &[Vector3<f64>]) -> Vector3<f64> {
+    points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64
+}

@@ -1,0 +1,149 @@
+//! Whether structure remains in the residual of the best model: along each joint's motion, and as a vector, against everything
+//! that was recorded.
+
+use nalgebra::Vector3;
+
+use super::conditions::Conditions;
+use super::outcome::Map;
+use crate::seed::stream;
+
+/// Permutations of the residual.
+const PERMUTATIONS: usize = 400;
+/// Bins of a map.
+const BINS: usize = 8;
+
+/// What the tests say.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Structure {
+    /// Of there being none, the best of all tests accounted for.
+    pub p_value: f64,
+    /// Where the strongest shows.
+    pub r#where: String,
+    /// By how many standard deviations it stands out.
+    pub strength: f64,
+}
+
+/// Neighbours in a variable, and what they say.
+struct Order {
+    name: String,
+    /// Rows from the smallest value on.
+    rows: Vec<usize>,
+}
+
+/// Orders of the rows by everything that was recorded.
+fn orders(conditions: &Conditions) -> Vec<Order> {
+    let readings = &conditions.readings;
+    let by = |name: String, value: &dyn Fn(usize) -> f64| {
+        let mut rows: Vec<usize> = (0..readings.len()).collect();
+        rows.sort_by(|a, b| value(*a).total_cmp(&value(*b)).then(a.cmp(b)));
+        Order { name, rows }
+    };
+    let mut orders = Vec::new();
+    for joint in 0..conditions.columns.travel.len() {
+        orders.push(by(format!("the angle of joint {}", joint + 1), &|row| readings[row].joints[joint]));
+        orders.push(by(format!("the torque of joint {}", joint + 1), &|row| readings[row].posture.torque(joint)));
+    }
+    if conditions.columns.time {
+        orders.push(by("time".to_owned(), &|row| readings[row].share));
+    }
+    if conditions.columns.temperature {
+        orders.push(by("temperature".to_owned(), &|row| readings[row].rise_k[0]));
+    }
+    orders
+}
+
+/// Tests `residual` (one vector per row, in sigmas) for likeness of neighbours in every order.
+#[must_use]
+pub fn structure(conditions: &Conditions, residual: &[Vector3<f64>]) -> Structure {
+    let total = residual.len();
+    let orders = orders(conditions);
+    // Along each joint's motion, too: a joint's error is a scalar that may change sign with the pose as a vector does.
+    let joints = conditions.columns.travel.len();
+    let directions: Vec<Vec<Vector3<f64>>> = (0..joints)
+        .map(|joint| {
+            let moved = |row: usize| {
+                let [x, y, z, ..] = conditions.readings[row].moved(joint, 1.0);
+                Vector3::new(x, y, z)
+            };
+            let all: Vec<Vector3<f64>> = (0..total).map(moved).collect();
+            let size = (all.iter().map(Vector3::norm_squared).sum::<f64>() / total.max(1) as f64).sqrt().max(1e-9);
+            all.into_iter().map(|direction| direction / size).collect()
+        })
+        .collect();
+    let statistics = |residual: &[Vector3<f64>]| -> Vec<f64> {
+        let mut values = Vec::new();
+        let scalars: Vec<Vec<f64>> = directions
+            .iter()
+            .map(|of_joint| of_joint.iter().zip(residual).map(|(direction, residual)| direction.dot(residual)).collect())
+            .collect();
+        for order in &orders {
+            let pairs = || order.rows.windows(2).chain(order.rows.windows(3));
+            let alike: f64 = pairs().map(|pair| residual[pair[0]].dot(&residual[pair[pair.len() - 1]])).sum();
+            values.push(alike);
+            for scalar in &scalars {
+                values.push(pairs().map(|pair| scalar[pair[0]] * scalar[pair[pair.len() - 1]]).sum());
+            }
+        }
+        values
+    };
+    let observed = statistics(residual);
+    let mut stream = stream(1, "diagnosis/permutations");
+    let mut shuffled = residual.to_vec();
+    let permuted: Vec<Vec<f64>> = (0..PERMUTATIONS)
+        .map(|_| {
+            stream.shuffle(&mut shuffled);
+            statistics(&shuffled)
+        })
+        .collect();
+    let count = observed.len();
+    let (mut mean, mut deviation) = (vec![0.0; count], vec![0.0; count]);
+    for at in 0..count {
+        mean[at] = permuted.iter().map(|values| values[at]).sum::<f64>() / PERMUTATIONS as f64;
+        let variance = permuted.iter().map(|values| (values[at] - mean[at]) * (values[at] - mean[at])).sum::<f64>();
+        deviation[at] = (variance / PERMUTATIONS as f64).sqrt().max(1e-12);
+    }
+    let strongest = |values: &[f64]| {
+        let standard = |at: usize| (values[at] - mean[at]) / deviation[at];
+        (0..count).map(|at| (at, standard(at))).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))
+    };
+    let (at, strength) = strongest(&observed);
+    let above = permuted.iter().filter(|values| strongest(values).1 >= strength).count();
+    let per_order = 1 + joints;
+    let of = at % per_order;
+    let what = if of == 0 { "the residual".to_owned() } else { format!("the residual along joint {}", of) };
+    Structure {
+        p_value: (above + 1) as f64 / (PERMUTATIONS + 1) as f64,
+        r#where: format!("{what} follows {}", orders[at / per_order].name),
+        strength,
+    }
+}
+
+/// The mean residual (m) along each joint's motion by its angle, as an angle of the joint.
+#[must_use]
+pub fn maps(conditions: &Conditions, residual_m: &[Vector3<f64>]) -> Vec<Map> {
+    let joints = conditions.columns.travel.len();
+    (0..joints)
+        .map(|joint| {
+            let [low, high] = conditions.columns.travel[joint];
+            let width = ((high - low) / BINS as f64).max(1e-12);
+            let (mut over, mut under, mut squares) = ([0.0; BINS], [0.0; BINS], [0.0; BINS]);
+            for (reading, residual) in conditions.readings.iter().zip(residual_m) {
+                let bin = (((reading.joints[joint] - low) / width) as usize).min(BINS - 1);
+                let [x, y, z, ..] = reading.moved(joint, 1.0);
+                let direction = Vector3::new(x, y, z);
+                over[bin] += direction.dot(residual);
+                under[bin] += direction.norm_squared();
+                squares[bin] += residual.norm_squared() / 3.0 * direction.norm_squared();
+            }
+            let of = |value: fn(f64, f64, f64) -> f64| -> Vec<f64> {
+                (0..BINS).map(|bin| if under[bin] > 1e-9 { value(over[bin], under[bin], squares[bin]) } else { 0.0 }).collect()
+            };
+            Map {
+                joint: joint + 1,
+                angle: (0..BINS).map(|bin| low + (bin as f64 + 0.5) * width).collect(),
+                mean: of(|over, under, _| over / under),
+                standard_error: of(|_, under, squares| squares.sqrt() / under),
+            }
+        })
+        .collect()
+}

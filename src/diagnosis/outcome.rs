@@ -1,0 +1,201 @@
+//! What a diagnosis says: the JSON object of `kincal diagnose --json`.
+
+use serde::{Deserialize, Serialize};
+
+use crate::effects::Level;
+
+/// JSON Schema of [`Diagnosis`].
+pub const SCHEMA: &str = include_str!("schema.json");
+
+/// The answer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Diagnosis {
+    /// In one word.
+    pub verdict: Verdict,
+    /// In one sentence.
+    pub sentence: String,
+    /// Noise of the sensor, one sigma per axis.
+    pub noise_floor: NoiseFloor,
+    /// 3-D position RMS on held-out poses.
+    pub gap: Gap,
+    /// What is named, in the order added.
+    pub effects: Vec<Effect>,
+    /// What cannot be told apart.
+    pub confusion_sets: Vec<Vec<Candidate>>,
+    /// What this data set would not show.
+    pub undetectable: Vec<Undetectable>,
+    /// Smallest magnitude that this data set would show, of everything else.
+    pub detectable: Vec<Undetectable>,
+    /// What no effect explains.
+    pub unknown: Unknown,
+    /// What remains over the workspace: by joint angle, the mean residual along the joint's motion.
+    pub maps: Vec<Map>,
+    /// What to measure next.
+    pub next_measurements: Vec<String>,
+    /// What was assumed, switched off, thinned out or left out.
+    pub notes: Vec<String>,
+    /// Number of readings used.
+    pub readings: usize,
+}
+
+/// The answer in one word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Geometry explains everything, and what is realistic would have shown.
+    NoGap,
+    /// The effects named explain everything.
+    Explained,
+    /// Something is there, and several hypotheses explain it as well.
+    Ambiguous,
+    /// Something is there that no effect of the library explains.
+    UnknownRemains,
+    /// Nothing is seen, but little could have been.
+    NotDetectable,
+}
+
+/// Noise of the sensor.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NoiseFloor {
+    /// m.
+    pub position_m: f64,
+    /// rad; absent where no attitudes are measured.
+    pub rotation_rad: Option<f64>,
+    /// Where it comes from.
+    pub source: NoiseSource,
+}
+
+/// Where the noise floor comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NoiseSource {
+    /// Readings of the same configuration under the same conditions.
+    Repeats,
+    /// A data sheet, or the command line.
+    Declared,
+    /// Nothing: a usual value.
+    Assumed,
+}
+
+/// 3-D position RMS on held-out poses, m.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Gap {
+    /// Base and tool fitted only.
+    pub nominal_rms_m: f64,
+    /// All geometry fitted.
+    pub geometry_rms_m: f64,
+    /// Geometry and what each fold chose.
+    pub explained_rms_m: f64,
+    /// Noise floor in 3-D.
+    pub noise_rms_m: f64,
+    /// Share of the gap between geometry and noise that the effects close.
+    pub gap_closed: Option<f64>,
+    /// Its 95 % interval, from the folds.
+    pub gap_closed_ci95: Option<[f64; 2]>,
+    /// Folds.
+    pub folds: usize,
+}
+
+/// Where an effect is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Place {
+    /// What it belongs to.
+    pub level: Level,
+    /// From 1.
+    pub index: Option<usize>,
+    /// Change point, s (row index where the input has no time).
+    pub time_s: Option<f64>,
+}
+
+/// A magnitude.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Magnitude {
+    /// Positive where the kind has no sign.
+    pub value: f64,
+    /// SI.
+    pub unit: String,
+    /// 95 % interval.
+    pub ci95: [f64; 2],
+}
+
+/// An effect that is named.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Effect {
+    /// Kind.
+    pub kind: String,
+    /// Where.
+    pub location: Place,
+    /// That it is there.
+    pub probability: f64,
+    /// How large.
+    pub magnitude: Magnitude,
+    /// 3-D RMS on held-out poses before it was added, m.
+    pub held_out_rms_before_m: f64,
+    /// And after.
+    pub held_out_rms_after_m: f64,
+    /// 1 − (after² − σ²)/(before² − σ²).
+    pub gap_closed: Option<f64>,
+    /// How many folds chose it, of how many.
+    pub folds: [usize; 2],
+    /// What else it has.
+    pub detail: String,
+}
+
+/// A hypothesis of a set.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Candidate {
+    /// Kind; `unknown` for a shape without a name.
+    pub kind: String,
+    /// Where.
+    pub location: Place,
+    /// That it is this one.
+    pub probability: f64,
+    /// What it is, for a shape without a name.
+    pub detail: String,
+}
+
+/// A hypothesis that this data set would show from some magnitude on, or not at all.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Undetectable {
+    /// Kind.
+    pub kind: String,
+    /// Where.
+    pub location: Place,
+    /// Smallest magnitude that would be named in four cases of five.
+    pub minimum_detectable: MinimumDetectable,
+    /// Why; empty where it is detectable.
+    pub reason: String,
+}
+
+/// A least magnitude.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MinimumDetectable {
+    /// Absent where no magnitude would show.
+    pub value: Option<f64>,
+    /// SI.
+    pub unit: String,
+}
+
+/// What no effect explains.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Unknown {
+    /// Something is left.
+    pub present: bool,
+    /// Of the residual having no structure, all tests together.
+    pub p_value: f64,
+    /// Where it shows.
+    pub r#where: Option<String>,
+}
+
+/// Mean residual along a joint's motion, by its angle.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Map {
+    /// From 1.
+    pub joint: usize,
+    /// Middle of each bin, rad (m).
+    pub angle: Vec<f64>,
+    /// Mean of the residual, as an angle of the joint, rad (m).
+    pub mean: Vec<f64>,
+    /// Its standard error.
+    pub standard_error: Vec<f64>,
+}

@@ -1,0 +1,313 @@
+//! Measurements as rows of a linear problem: the geometry fitted, residuals, and what each geometric error does to them.
+//!
+//! The arm stands at `measurement_from_root` and ends in a target on its tool; between its joints sit six small errors per frame
+//! with weak Gaussian priors. Base and target are free. All vectors are in the root frame, the chain's first.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+use crate::arm::Arm;
+use crate::effects::signature::posture::{Mechanism, Posture};
+use crate::frames::{Pose, rotation_from_vector, rotation_vector};
+use crate::measurement::{Measurement, Sensor};
+
+/// One sigma of a joint frame's position, m: machining and assembly are better than this.
+const FRAME_SHIFT: f64 = 5e-3;
+/// One sigma of a joint frame's attitude, rad.
+const FRAME_TURN: f64 = 10e-3;
+/// Base and target are free: so wide, about where the fit finds them, that it never binds.
+const FREE_SHIFT: f64 = 50e-3;
+const FREE_TURN: f64 = 50e-3;
+/// Steps of the fit.
+const STEPS: usize = 30;
+
+/// Why nothing can be diagnosed.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum DiagnosisError {
+    /// Too few rows.
+    #[error("{found} rows at {different} different configurations; a diagnosis needs at least {needed} different ones")]
+    TooFew {
+        /// Rows.
+        found: usize,
+        /// Different configurations.
+        different: usize,
+        /// Least.
+        needed: usize,
+    },
+    /// All in one place.
+    #[error(
+        "the measured (or the nominal) positions lie in one point or on one line, so that they cannot tell where the arm stands; \
+         are the joint units right, and is it this robot?"
+    )]
+    Degenerate,
+    /// The fit went astray.
+    #[error(
+        "no arm of this kind makes these readings: with base, target and geometry fitted, {rms_mm:.0} mm RMS remain; are the units \
+         right, are joints swapped or frozen, and is it this robot?"
+    )]
+    NotThisRobot {
+        /// Remaining, mm.
+        rms_mm: f64,
+    },
+    /// Rows with another number of joints.
+    #[error("row {row} has {found} joint readings, the robot has {expected} joints")]
+    Joints {
+        /// From 1.
+        row: usize,
+        /// Readings.
+        found: usize,
+        /// Joints.
+        expected: usize,
+    },
+}
+
+/// The fitted geometry and what it leaves.
+#[derive(Clone, Debug)]
+pub struct Rows {
+    /// Fitted arm.
+    pub mechanism: Mechanism,
+    /// Where it stands.
+    pub measurement_from_root: Pose,
+    /// Arm in each row.
+    pub postures: Vec<Posture>,
+    /// Target in root of each row, m.
+    pub targets: Vec<Vector3<f64>>,
+    /// Equations per row: 3, with attitudes 6.
+    pub per_row: usize,
+    /// Residuals, m and rad.
+    pub residual: DVector<f64>,
+    /// One over sigma of each equation.
+    pub whitening: DVector<f64>,
+    /// What each geometric parameter, scaled by its prior's sigma, does.
+    pub jacobian: DMatrix<f64>,
+    /// The fitted parameters over the sigmas of their priors.
+    pub parameters: DVector<f64>,
+    /// Which parameters are free (base and target).
+    pub free: Vec<bool>,
+    /// Names of the targets.
+    pub targets_named: Vec<String>,
+}
+
+/// Sigmas of the position (m) and the attitude (rad) of a reading.
+fn sigmas(sensor: &Sensor, position: &Vector3<f64>) -> (f64, f64) {
+    (sensor.position_sigma_at(position).max(1e-9), sensor.attitude_sigma_rad.unwrap_or(1.0).max(1e-9))
+}
+
+/// Fits base, target and geometry of `arm` to `measurements`, each weighted by `weights` (1 for a good reading).
+///
+/// # Errors
+/// If the measurements cannot tell.
+pub fn fit(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], weights: &[f64]) -> Result<Rows, DiagnosisError> {
+    let mut mechanism = Mechanism::new(arm);
+    let count = mechanism.joint_count();
+    for (row, measurement) in measurements.iter().enumerate() {
+        let found = measurement.joints.len();
+        if found != count {
+            return Err(DiagnosisError::Joints { row: row + 1, found, expected: count });
+        }
+    }
+    let mut different: Vec<&[f64]> = measurements.iter().map(|row| row.joints.as_slice()).collect();
+    different.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
+    different.dedup();
+    if different.len() < 6 {
+        return Err(DiagnosisError::TooFew { found: measurements.len(), different: different.len(), needed: 6 });
+    }
+    let attitude = sensor.attitude_sigma_rad.is_some() && measurements.iter().all(|row| row.attitude_xyzw.is_some());
+    let per_row = if attitude { 6 } else { 3 };
+    let name = |row: &Measurement| row.target.clone().unwrap_or_default();
+    let mut targets_named: Vec<String> = measurements.iter().map(|row| name(row)).collect();
+    targets_named.sort();
+    targets_named.dedup();
+    let which: Vec<usize> =
+        measurements.iter().map(|row| targets_named.iter().position(|known| *known == name(row)).unwrap_or(0)).collect();
+    let mut offsets = vec![Vector3::zeros(); targets_named.len()];
+    let mut turns = vec![UnitQuaternion::identity(); targets_named.len()];
+    let per_target = if attitude { 6 } else { 3 };
+
+    let from: Vec<Vector3<f64>> = measurements.iter().map(|row| mechanism.posture(&row.joints, 0.0).tool).collect();
+    let to: Vec<Vector3<f64>> = measurements.iter().map(|row| row.position().coords).collect();
+    let mut measurement_from_root = registration(&from, &to).ok_or(DiagnosisError::Degenerate)?;
+    if attitude {
+        // The first reading of each target tells its attitude well enough to start from.
+        for target in 0..targets_named.len() {
+            if let Some(row) = which.iter().position(|known| *known == target) {
+                let posture = mechanism.posture(&measurements[row].joints, 0.0);
+                let tool = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(posture.tool_axes));
+                let measured = measurements[row].attitude().unwrap_or_default();
+                turns[target] = (measurement_from_root.rotation * tool).inverse() * measured;
+            }
+        }
+    }
+
+    let frames = count - 1;
+    let width = 6 + 6 * frames + per_target * targets_named.len();
+    let free: Vec<bool> = (0..width).map(|column| column < 6 || column >= 6 + 6 * frames).collect();
+    let prior = |column: usize| {
+        let is_turn = if column < 6 + 6 * frames { column % 6 >= 3 } else { (column - 6 - 6 * frames) % per_target >= 3 };
+        match (free[column], is_turn) {
+            (true, false) => FREE_SHIFT,
+            (true, true) => FREE_TURN,
+            (false, false) => FRAME_SHIFT,
+            (false, true) => FRAME_TURN,
+        }
+    };
+    let prior: Vec<f64> = (0..width).map(prior).collect();
+    let mut parameters: DVector<f64> = DVector::zeros(width);
+    let equations = per_row * measurements.len();
+    let mut damping = 0.0;
+    let mut best = f64::INFINITY;
+    for step in 0.. {
+        // Base and target first: what is fitted with them far off would throw the frames about.
+        let coarse = step < 8;
+        let mut jacobian = DMatrix::zeros(equations, width);
+        let mut residual = DVector::zeros(equations);
+        let mut whitening = DVector::zeros(equations);
+        let (mut postures, mut targets) = (Vec::new(), Vec::new());
+        let root_from_measurement = measurement_from_root.inverse();
+        for (row, measurement) in measurements.iter().enumerate() {
+            let posture = mechanism.posture(&measurement.joints, measurement.payload_kg.unwrap_or(0.0));
+            let target = posture.tool + posture.tool_axes * offsets[which[row]];
+            let first = row * per_row;
+            let measured = (root_from_measurement * measurement.position()).coords;
+            residual.fixed_rows_mut::<3>(first).copy_from(&(measured - target));
+            let (position, turn) = sigmas(sensor, &measurement.position().coords);
+            let weight = libm::sqrt(weights[row]);
+            for equation in 0..per_row {
+                whitening[first + equation] = weight / if equation < 3 { position } else { turn };
+            }
+            if let (true, Some(measured)) = (attitude, measurement.attitude()) {
+                let tool = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(posture.tool_axes));
+                let predicted = tool * turns[which[row]];
+                let difference = rotation_vector(&(root_from_measurement.rotation * measured * predicted.inverse()));
+                residual.fixed_rows_mut::<3>(first + 3).copy_from(&difference);
+            }
+            let mut put = |column: usize, shift: Vector3<f64>, turn: Vector3<f64>| {
+                for axis in 0..3 {
+                    jacobian[(first + axis, column)] = shift[axis] * prior[column];
+                    if attitude {
+                        jacobian[(first + 3 + axis, column)] = turn[axis] * prior[column];
+                    }
+                }
+            };
+            let mut frame = |column: usize, axes: &Matrix3<f64>, origin: &Vector3<f64>| {
+                for axis in 0..3 {
+                    let direction: Vector3<f64> = axes.column(axis).into();
+                    put(column + axis, direction, Vector3::zeros());
+                    put(column + 3 + axis, direction.cross(&(target - origin)), direction);
+                }
+            };
+            frame(0, &Matrix3::identity(), &Vector3::zeros());
+            if !coarse {
+                for joint in 1..count {
+                    let moved = &posture.frames[joint - 1];
+                    let axes = moved * mechanism.segments[joint].rotation.to_rotation_matrix().into_inner();
+                    frame(6 * joint, &axes, &posture.origins[joint]);
+                }
+            }
+            let column = 6 + 6 * frames + per_target * which[row];
+            for axis in 0..3 {
+                let direction: Vector3<f64> = posture.tool_axes.column(axis).into();
+                put(column + axis, direction, Vector3::zeros());
+                if attitude {
+                    put(column + 3 + axis, Vector3::zeros(), direction);
+                }
+            }
+            postures.push(posture);
+            targets.push(target);
+        }
+        let whitened = scaled(&jacobian, &whitening);
+        let errors = residual.component_mul(&whitening);
+        // The prior pulls the frames' errors to zero, and base and target to where they are.
+        let pull = DVector::from_fn(width, |column, _| if free[column] { 0.0 } else { -parameters[column] });
+        let cost = errors.norm_squared() + pull.norm_squared();
+        let mut normal = whitened.transpose() * &whitened;
+        for column in 0..width {
+            normal[(column, column)] += 1.0;
+            normal[(column, column)] *= 1.0 + damping;
+        }
+        let gradient = whitened.transpose() * &errors + &pull;
+        let change = normal.cholesky().map(|cholesky| cholesky.solve(&gradient));
+        let done = change.as_ref().is_none_or(|change| change.norm() < 1e-9) || step >= STEPS;
+        if (done && !coarse) || step >= STEPS {
+            let rms = libm::sqrt(
+                measurements
+                    .iter()
+                    .enumerate()
+                    .map(|(row, _)| residual.fixed_rows::<3>(row * per_row).norm_squared())
+                    .sum::<f64>()
+                    / measurements.len() as f64,
+            );
+            let reach: f64 = mechanism.segments.iter().map(|segment| segment.translation.vector.norm()).sum();
+            if !(rms < 0.05 * reach.max(0.1)) {
+                return Err(DiagnosisError::NotThisRobot { rms_mm: rms * 1e3 });
+            }
+            return Ok(Rows {
+                mechanism,
+                measurement_from_root,
+                postures,
+                targets,
+                per_row,
+                residual,
+                whitening,
+                jacobian,
+                parameters,
+                free,
+                targets_named,
+            });
+        }
+        damping = if cost > best && step > 8 { (10.0 * damping).max(1e-3) } else { damping / 10.0 };
+        best = cost;
+        let change = change.unwrap_or_else(|| DVector::zeros(width));
+        parameters += &change;
+        let part = |column: usize| {
+            let at = |offset: usize| change[column + offset] * prior[column + offset];
+            (Vector3::new(at(0), at(1), at(2)), column + 3)
+        };
+        let pose = |column: usize| {
+            let (shift, next) = part(column);
+            let turn = Vector3::from_fn(|axis, _| change[next + axis] * prior[next + axis]);
+            Pose::from_parts(Translation3::from(shift), rotation_from_vector(&turn))
+        };
+        measurement_from_root *= pose(0);
+        for joint in 1..count {
+            mechanism.segments[joint] *= pose(6 * joint);
+        }
+        for target in 0..targets_named.len() {
+            let column = 6 + 6 * frames + per_target * target;
+            offsets[target] += part(column).0;
+            if attitude {
+                let turn = Vector3::from_fn(|axis, _| change[column + 3 + axis] * prior[column + 3 + axis]);
+                turns[target] = rotation_from_vector(&turn) * turns[target];
+            }
+        }
+    }
+    unreachable!("the loop ends by returning")
+}
+
+/// `matrix` with each row times its weight.
+pub(super) fn scaled(matrix: &DMatrix<f64>, weights: &DVector<f64>) -> DMatrix<f64> {
+    let mut result = matrix.clone();
+    for mut column in result.column_iter_mut() {
+        column.component_mul_assign(weights);
+    }
+    result
+}
+
+/// The pose that brings `from` nearest to `to` (Kabsch 1976); `None` where the points lie on a line.
+fn registration(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Pose> {
+    let count = from.len() as f64;
+    let (from_centre, to_centre) = (from.iter().sum::<Vector3<f64>>() / count, to.iter().sum::<Vector3<f64>>() / count);
+    let covariance: Matrix3<f64> =
+        from.iter().zip(to).map(|(from, to)| (to - to_centre) * (from - from_centre).transpose()).sum();
+    let svd = covariance.svd(true, true);
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    let mut values: Vec<f64> = svd.singular_values.iter().copied().collect();
+    values.sort_by(|a, b| b.total_cmp(a));
+    if values[1] <= values[0] * 1e-9 || !values[0].is_finite() || values[0] < 1e-12 {
+        return None;
+    }
+    let mut signs = Matrix3::identity();
+    let smallest = svd.singular_values.imin();
+    signs[(smallest, smallest)] = (u * v_t).determinant().signum();
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(u * signs * v_t));
+    Some(Pose::from_parts(Translation3::from(to_centre - rotation * from_centre), rotation))
+}

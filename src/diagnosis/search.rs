@@ -1,0 +1,167 @@
+//! The search over sets of effects: forward with a beam, then swaps and deletions, and the probabilities that come of it.
+
+use std::collections::BTreeMap;
+
+use super::evidence::{Candidates, Model, NoisePrior, extensions, log_posterior};
+use super::gram::Surviving;
+
+/// Most effects of a set.
+pub const MOST: usize = 4;
+/// Sets kept at each size.
+const BEAM: usize = 5;
+/// Differences of log posterior beyond which a model adds nothing to a probability.
+const NEGLIGIBLE: f64 = 14.0;
+
+/// What a search found.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// The best set, its members in the order in which they help most.
+    pub best: Model,
+    /// Models with their posterior probabilities among all explored, most likely first.
+    pub models: Vec<(Vec<(usize, usize)>, f64)>,
+}
+
+type Key = Vec<usize>;
+
+/// Models explored: of each set of hypotheses, the best scales and the logarithm of the sum over scales.
+#[derive(Default)]
+struct Explored {
+    sets: BTreeMap<Key, BTreeMap<Vec<usize>, Model>>,
+}
+
+impl Explored {
+    fn add(&mut self, model: Model) {
+        let mut sorted = model.members.clone();
+        sorted.sort_unstable();
+        let key: Key = sorted.iter().map(|(hypothesis, _)| *hypothesis).collect();
+        let scales: Vec<usize> = sorted.iter().map(|(_, scale)| *scale).collect();
+        let of_set = self.sets.entry(key).or_default();
+        match of_set.get_mut(&scales) {
+            Some(known) if known.log_posterior >= model.log_posterior => {}
+            Some(known) => *known = model,
+            None => {
+                of_set.insert(scales, model);
+            }
+        }
+    }
+
+    fn best(&self) -> Option<&Model> {
+        self.sets.values().flat_map(BTreeMap::values).max_by(|a, b| a.log_posterior.total_cmp(&b.log_posterior))
+    }
+}
+
+/// Searches. `most`: effects of a set at most.
+#[must_use]
+pub fn search(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior, most: usize) -> Found {
+    let empty = Model { members: Vec::new(), log_posterior: 0.0 };
+    // An extension knows what the new member's sign is worth, not how it shifts those of the others.
+    let exact = |model: &Model| Model {
+        members: model.members.clone(),
+        log_posterior: log_posterior(surviving, candidates, noise, &model.members),
+    };
+    let mut explored = Explored::default();
+    explored.add(empty.clone());
+    let mut beam = vec![empty];
+    for _ in 0..most {
+        let mut next: Vec<Model> = Vec::new();
+        for model in &beam {
+            let found = extensions(surviving, candidates, noise, &model.members);
+            next.extend(found);
+        }
+        next.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
+        let best_before = explored.best().map_or(0.0, |best| best.log_posterior);
+        let Some(best_now) = next.first().map(|model| model.log_posterior) else {
+            break;
+        };
+        for model in next.iter().take_while(|model| model.log_posterior > best_now.max(best_before) - NEGLIGIBLE) {
+            explored.add(exact(model));
+        }
+        // Two sets that differ in a scale only are one.
+        beam.clear();
+        for model in next {
+            let same = |other: &Model| {
+                let key = |model: &Model| {
+                    let mut key: Key = model.members.iter().map(|(hypothesis, _)| *hypothesis).collect();
+                    key.sort_unstable();
+                    key
+                };
+                key(other) == key(&model)
+            };
+            if !beam.iter().any(same) {
+                beam.push(model);
+            }
+            if beam.len() >= BEAM {
+                break;
+            }
+        }
+        if best_now < best_before - 6.0 {
+            break;
+        }
+    }
+    // Swaps and deletions about the best, until there is none better.
+    for _ in 0..6 {
+        let Some(best) = explored.best().cloned() else {
+            break;
+        };
+        for leave in 0..best.members.len() {
+            let mut fewer = best.members.clone();
+            fewer.remove(leave);
+            let log_posterior = log_posterior(surviving, candidates, noise, &fewer);
+            explored.add(Model { members: fewer.clone(), log_posterior });
+            for model in extensions(surviving, candidates, noise, &fewer) {
+                if model.log_posterior > best.log_posterior - NEGLIGIBLE {
+                    explored.add(exact(&model));
+                }
+            }
+        }
+        if best.members.len() < most {
+            for model in extensions(surviving, candidates, noise, &best.members) {
+                if model.log_posterior > best.log_posterior - NEGLIGIBLE {
+                    explored.add(exact(&model));
+                }
+            }
+        }
+        if explored.best().is_some_and(|now| now.log_posterior <= best.log_posterior + 1e-9) {
+            break;
+        }
+    }
+    let best = explored.best().cloned().unwrap_or(Model { members: Vec::new(), log_posterior: 0.0 });
+    let mut models = Vec::new();
+    let mut total = 0.0;
+    for of_set in explored.sets.values() {
+        let weight: f64 = of_set.values().map(|model| libm::exp(model.log_posterior - best.log_posterior)).sum();
+        if let Some(top) = of_set.values().max_by(|a, b| a.log_posterior.total_cmp(&b.log_posterior)) {
+            models.push((top.members.clone(), weight));
+        }
+        total += weight;
+    }
+    for (_, weight) in &mut models {
+        *weight /= total;
+    }
+    models.sort_by(|a, b| b.1.total_cmp(&a.1));
+    models.truncate(400);
+    let members = in_order(surviving, candidates, noise, &best.members);
+    Found { best: Model { members, ..best }, models }
+}
+
+/// The members in the order in which each adds most to what those before it explain.
+fn in_order(
+    surviving: &Surviving,
+    candidates: &Candidates,
+    noise: NoisePrior,
+    members: &[(usize, usize)],
+) -> Vec<(usize, usize)> {
+    let mut left = members.to_vec();
+    let mut ordered: Vec<(usize, usize)> = Vec::new();
+    while !left.is_empty() {
+        let value = |member: &(usize, usize)| {
+            let mut with = ordered.clone();
+            with.push(*member);
+            log_posterior(surviving, candidates, noise, &with)
+        };
+        let values: Vec<f64> = left.iter().map(value).collect();
+        let next = (0..left.len()).max_by(|a, b| values[*a].total_cmp(&values[*b])).unwrap_or(0);
+        ordered.push(left.remove(next));
+    }
+    ordered
+}

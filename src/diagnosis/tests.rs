@@ -1,0 +1,245 @@
+//! The diagnosis of arms whose fault is known, made by other means than the signatures: joint angles that are off, with torques from
+//! the slope of the potential energy.
+
+use nalgebra::{DMatrix, Vector3};
+use serde_json::Value;
+
+use super::gram::Gram;
+use super::outcome::{Diagnosis, NoiseSource, Verdict};
+use super::{Options, diagnose};
+use crate::arm::Arm;
+use crate::effects::Kind;
+use crate::effects::signature::posture::Mechanism;
+use crate::measurement::{Measurement, Sensor};
+use crate::scene;
+use crate::seed::{Stream, stream};
+
+const SIGMA: f64 = 20e-6;
+
+fn arm() -> Arm {
+    scene::read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml")).unwrap().scene.arm
+}
+
+fn sensor() -> Sensor {
+    Sensor {
+        position_in_base: nalgebra::Point3::origin(),
+        position_sigma_m: SIGMA,
+        position_sigma_per_m: 0.0,
+        attitude_sigma_rad: None,
+        temperature_sigma_k: None,
+        view: None,
+    }
+}
+
+/// Energy of the arm in the field of gravity, J.
+fn energy(arm: &Arm, joints: &[f64], payload_kg: f64) -> f64 {
+    let at = arm.chain.at_nominal();
+    let names = arm.chain.frame_names();
+    let frames = at.frames(joints);
+    let mut moment = at.forward(joints).translation.vector * payload_kg;
+    for link in &arm.links[1..] {
+        let inertial = link.inertial.as_ref().unwrap();
+        let frame = names.iter().position(|name| *name == link.name).unwrap();
+        moment += (frames[frame] * inertial.centre_of_mass_in_link).coords * inertial.mass_kg;
+    }
+    -arm.gravity_in_base.dot(&moment)
+}
+
+fn torque(arm: &Arm, joints: &[f64], joint: usize, payload_kg: f64) -> f64 {
+    let at = |shift: f64| {
+        let mut moved = joints.to_vec();
+        moved[joint] += shift;
+        energy(arm, &moved, payload_kg)
+    };
+    -(at(1e-5) - at(-1e-5)) / 2e-5
+}
+
+fn readings(label: &str, off: impl Fn(&Arm, &[f64], &[i8], usize, f64) -> f64) -> (Arm, Vec<Measurement>) {
+    let arm = arm();
+    let mut stream: Stream = stream(5, label);
+    let mut values = arm.chain.nominal();
+    for (value, parameter) in values.iter_mut().zip(&arm.chain.parameters) {
+        let half = if parameter.quantity.unit() == "m" { 1e-3 } else { 3e-3 };
+        *value += stream.uniform(-half, half);
+    }
+    let at = arm.chain.at(&values);
+    let rows = (0..60)
+        .map(|index| {
+            let joints: Vec<f64> = arm.chain.joints.iter().map(|joint| stream.uniform(joint.lower, joint.upper)).collect();
+            let approach: Vec<i8> = joints.iter().map(|_| if stream.unit() < 0.5 { -1 } else { 1 }).collect();
+            let payload_kg = if index % 2 == 0 { 0.0 } else { 4.0 };
+            let true_joints: Vec<f64> =
+                (0..joints.len()).map(|joint| joints[joint] + off(&arm, &joints, &approach, joint, payload_kg)).collect();
+            let noise = Vector3::from_fn(|_, _| SIGMA * stream.normal());
+            let position = at.forward(&true_joints).translation.vector + noise;
+            Measurement {
+                index,
+                pose_id: index,
+                time_s: 60.0 * index as f64,
+                joints,
+                position_m: position.into(),
+                approach,
+                payload_kg: Some(payload_kg),
+                ..Measurement::default()
+            }
+        })
+        .collect();
+    (arm, rows)
+}
+
+fn diagnosed(arm: &Arm, rows: &[Measurement], without: Vec<Kind>) -> Diagnosis {
+    let rows: Vec<&Measurement> = rows.iter().collect();
+    diagnose(arm, &sensor(), &rows, &Options { noise: NoiseSource::Declared, without }).unwrap()
+}
+
+#[test]
+fn torques_are_the_slope_of_the_energy() {
+    let arm = arm();
+    let mechanism = Mechanism::new(&arm);
+    let mut stream = stream(2, "test/torque");
+    for _ in 0..20 {
+        let joints: Vec<f64> = (0..8).map(|_| stream.uniform(-2.0, 2.0)).collect();
+        let posture = mechanism.posture(&joints, 3.0);
+        for joint in 0..8 {
+            let expected = torque(&arm, &joints, joint, 3.0);
+            assert!((posture.torque(joint) - expected).abs() < 1e-4, "{} against {expected}", posture.torque(joint));
+        }
+        let tool = arm.chain.at_nominal().forward(&joints).translation.vector;
+        assert!((posture.tool - tool).norm() < 1e-12);
+    }
+}
+
+#[test]
+fn an_arm_without_a_fault_has_no_gap() {
+    let (arm, rows) = readings("test/nothing", |_, _, _, _, _| 0.0);
+    let found = diagnosed(&arm, &rows, Vec::new());
+    assert!(matches!(found.verdict, Verdict::NoGap | Verdict::NotDetectable), "{}", found.sentence);
+    assert!(found.effects.is_empty() && !found.unknown.present);
+    // Held-out poses carry the noise and what the fit makes of it.
+    assert!((SIGMA..5.0 * SIGMA).contains(&found.gap.geometry_rms_m), "{}", found.gap.geometry_rms_m);
+    assert!(found.gap.nominal_rms_m > 1e-3);
+}
+
+#[test]
+fn backlash_and_compliance_are_named_with_place_and_size() {
+    let width = 4e-4;
+    let compliance = 5e-5;
+    let (arm, rows) = readings("test/two", |arm, joints, approach, joint, payload_kg| match joint {
+        2 => 0.5 * width * f64::from(approach[2]),
+        3 => compliance * torque(arm, joints, 3, payload_kg),
+        _ => 0.0,
+    });
+    let found = diagnosed(&arm, &rows, Vec::new());
+    assert_eq!(found.verdict, Verdict::Explained, "{}", found.sentence);
+    assert_eq!(found.effects.len(), 2, "{}", found.sentence);
+    for (kind, index, size) in [("backlash", 3, width), ("joint_compliance", 4, compliance)] {
+        let effect = found.effects.iter().find(|effect| effect.kind == kind).unwrap();
+        assert_eq!(effect.location.index, Some(index));
+        assert!((effect.magnitude.value / size - 1.0).abs() < 0.15, "{kind}: {} against {size}", effect.magnitude.value);
+        assert!(effect.held_out_rms_after_m < effect.held_out_rms_before_m);
+    }
+    assert!(found.gap.gap_closed.unwrap() > 0.8, "{:?}", found.gap);
+}
+
+#[test]
+fn a_fault_that_has_no_name_is_unknown() {
+    let (arm, rows) = readings("test/sector", |_, joints, _, joint, _| {
+        let off = (joints[joint] - 0.4).abs() / 0.5;
+        if joint == 3 && off < 1.0 { 8e-4 * (1.0 - off * off) } else { 0.0 }
+    });
+    let found = diagnosed(&arm, &rows, Vec::new());
+    assert_eq!(found.verdict, Verdict::UnknownRemains, "{}", found.sentence);
+    assert!(found.unknown.r#where.unwrap().contains("joint 4"));
+}
+
+#[test]
+fn too_few_readings_are_refused_and_swapped_joints_are_said() {
+    let (arm, mut rows) = readings("test/bad", |_, _, _, _, _| 0.0);
+    let options = Options { noise: NoiseSource::Declared, without: Vec::new() };
+    let few: Vec<&Measurement> = rows[..5].iter().collect();
+    assert!(diagnose(&arm, &sensor(), &few, &options).unwrap_err().to_string().contains("at least 6"));
+    let same = rows[0].clone();
+    let alike: Vec<&Measurement> = (0..20).map(|_| &same).collect();
+    assert!(diagnose(&arm, &sensor(), &alike, &options).is_err());
+    for row in &mut rows {
+        row.joints.swap(1, 2);
+    }
+    let swapped: Vec<&Measurement> = rows.iter().collect();
+    let message = diagnose(&arm, &sensor(), &swapped, &options).unwrap_err().to_string();
+    assert!(message.contains("swapped"), "{message}");
+}
+
+#[test]
+fn a_fold_less_is_a_subtraction() {
+    let mut stream = stream(3, "test/gram");
+    let matrix = DMatrix::from_fn(30, 6, |_, _| stream.normal());
+    let all = Gram::new(&matrix, 2);
+    let part = Gram::new(&matrix.rows(0, 12).into_owned(), 2);
+    let rest = Gram::new(&matrix.rows(12, 18).into_owned(), 2);
+    assert!((all.without(&part).products - rest.products).norm() < 1e-12);
+}
+
+/// Checks what the schema of this program uses of JSON Schema: types, enums, required, items, bounds, references, anyOf.
+fn check(root: &Value, schema: &Value, value: &Value, path: &str) -> Result<(), String> {
+    let wrong = |what: &str| Err(format!("{path}: {what}: {value}"));
+    if let Some(reference) = schema["$ref"].as_str() {
+        return check(root, root.pointer(reference.trim_start_matches('#')).ok_or("no such reference")?, value, path);
+    }
+    if let Some(any) = schema["anyOf"].as_array() {
+        return if any.iter().any(|one| check(root, one, value, path).is_ok()) { Ok(()) } else { wrong("none of anyOf") };
+    }
+    if let Some(allowed) = schema["enum"].as_array() {
+        return if allowed.contains(value) { Ok(()) } else { wrong("not in the enumeration") };
+    }
+    let types: Vec<&str> = match &schema["type"] {
+        Value::String(one) => vec![one],
+        Value::Array(several) => several.iter().filter_map(Value::as_str).collect(),
+        _ => return wrong("the schema has no type here"),
+    };
+    let is = |name: &&str| match *name {
+        "object" => value.is_object(),
+        "array" => value.is_array(),
+        "string" => value.is_string(),
+        "number" => value.is_number(),
+        "integer" => value.is_u64() || value.is_i64(),
+        "boolean" => value.is_boolean(),
+        _ => value.is_null(),
+    };
+    if !types.iter().any(is) {
+        return wrong("of another type");
+    }
+    if let Some(number) = value.as_f64() {
+        let below = schema["minimum"].as_f64().is_some_and(|least| number < least)
+            || schema["exclusiveMinimum"].as_f64().is_some_and(|least| number <= least);
+        if below || schema["maximum"].as_f64().is_some_and(|most| number > most) {
+            return wrong("out of bounds");
+        }
+    }
+    for name in schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str) {
+        if value.get(name).is_none() {
+            return wrong(&format!("`{name}` is missing"));
+        }
+    }
+    for (name, of) in value.as_object().into_iter().flatten() {
+        check(root, &schema["properties"][name], of, &format!("{path}/{name}"))?;
+    }
+    let items = value.as_array().map_or(&[][..], Vec::as_slice);
+    let (least, most) = (schema["minItems"].as_u64().unwrap_or(0), schema["maxItems"].as_u64().unwrap_or(u64::MAX));
+    if value.is_array() && !(least..=most).contains(&(items.len() as u64)) {
+        return wrong("of another length");
+    }
+    items.iter().enumerate().try_for_each(|(at, item)| check(root, &schema["items"], item, &format!("{path}/{at}")))
+}
+
+#[test]
+fn what_is_said_is_as_the_schema_has_it() {
+    let schema: Value = serde_json::from_str(super::outcome::SCHEMA).unwrap();
+    let (arm, rows) =
+        readings("test/schema", |_, _, approach, joint, _| if joint == 4 { 2e-4 * f64::from(approach[4]) } else { 0.0 });
+    let mut value = serde_json::to_value(diagnosed(&arm, &rows, Vec::new())).unwrap();
+    check(&schema, &schema, &value, "").unwrap();
+    assert!(!value["effects"].as_array().unwrap().is_empty() && !value["undetectable"].as_array().unwrap().is_empty());
+    // The check can fail.
+    value["effects"][0]["kind"] = "gremlins".into();
+    assert!(check(&schema, &schema, &value, "").unwrap_err().contains("/effects/0/kind"));
+}

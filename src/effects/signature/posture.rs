@@ -1,0 +1,151 @@
+//! An arm in one configuration: where its joints are, and what they carry. Everything is in the root frame, the chain's first.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use crate::arm::Arm;
+use crate::frames::Pose;
+use crate::kinematics::JointKind;
+
+/// What an arm is made of, as far as signatures need it.
+#[derive(Clone, Debug)]
+pub struct Mechanism {
+    /// Transforms between joints ([`crate::kinematics::ChainAt::segments`]).
+    pub segments: Vec<Pose>,
+    /// Which joints slide.
+    pub slides: Vec<bool>,
+    /// Mass of each moving link (kg) and its centre in the frame that moves with its joint (m).
+    pub centres: Vec<(f64, Point3<f64>)>,
+    /// Whether the masses are the robot's; else each link is taken to weigh 1 kg, in its middle.
+    pub masses_known: bool,
+    /// Free fall, m/s².
+    pub gravity: Vector3<f64>,
+}
+
+/// One configuration.
+#[derive(Clone, Debug)]
+pub struct Posture {
+    /// Directions of the joint axes.
+    pub axes: Vec<Vector3<f64>>,
+    /// Axes of the frame that moves with each joint, as columns.
+    pub frames: Vec<Matrix3<f64>>,
+    /// Origins of the joints, m.
+    pub origins: Vec<Vector3<f64>>,
+    /// Origin of the tool frame, m.
+    pub tool: Vector3<f64>,
+    /// Axes of the tool frame as columns.
+    pub tool_axes: Matrix3<f64>,
+    /// Force that each joint carries, N.
+    pub forces: Vec<Vector3<f64>>,
+    /// Moment about each joint's origin that it carries, N·m.
+    pub moments: Vec<Vector3<f64>>,
+}
+
+impl Mechanism {
+    /// The nominal arm.
+    #[must_use]
+    pub fn new(arm: &Arm) -> Mechanism {
+        let at = arm.chain.at_nominal();
+        let segments = at.segments();
+        let count = arm.joint_count();
+        let names = arm.chain.frame_names();
+        let rest = vec![0.0; count];
+        let frames = at.frames(&rest);
+        let joint_frames: Vec<Pose> = segments[..count]
+            .iter()
+            .scan(Pose::identity(), |root_from_joint, segment| {
+                *root_from_joint *= segment;
+                Some(*root_from_joint)
+            })
+            .collect();
+        let known = |joint: usize| -> Option<(f64, Point3<f64>)> {
+            let link = arm.links.get(joint + 1)?;
+            let inertial = link.inertial.as_ref()?;
+            let frame = names.iter().position(|name| *name == link.name)?;
+            Some((inertial.mass_kg, joint_frames[joint].inverse() * frames[frame] * inertial.centre_of_mass_in_link))
+        };
+        let masses: Vec<Option<(f64, Point3<f64>)>> = (0..count).map(known).collect();
+        // Flanges and adapters often have none; the arm's total does not.
+        let masses_known = masses.iter().flatten().map(|(mass, _)| mass).sum::<f64>() > 0.0;
+        let centres = masses
+            .into_iter()
+            .enumerate()
+            .map(|(joint, centre)| match centre {
+                Some(centre) => centre,
+                None if masses_known => (0.0, Point3::origin()),
+                None => (1.0, Point3::from(segments[joint + 1].translation.vector / 2.0)),
+            })
+            .collect();
+        let slides = arm.chain.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect();
+        Mechanism { segments, slides, centres, masses_known, gravity: arm.gravity_in_base }
+    }
+
+    /// Number of joints.
+    #[must_use]
+    pub fn joint_count(&self) -> usize {
+        self.slides.len()
+    }
+
+    /// The arm at the coordinates `joints` (rad or m), with a payload (kg) at the origin of its tool frame.
+    #[must_use]
+    pub fn posture(&self, joints: &[f64], payload_kg: f64) -> Posture {
+        let count = self.joint_count();
+        let (mut axes, mut frames, mut origins) = (Vec::new(), Vec::new(), Vec::new());
+        let mut centres = Vec::with_capacity(count);
+        let mut rotation = Matrix3::identity();
+        let mut origin = Vector3::zeros();
+        for joint in 0..=count {
+            let segment = &self.segments[joint];
+            origin += rotation * segment.translation.vector;
+            rotation *= segment.rotation.to_rotation_matrix().into_inner();
+            if joint == count {
+                break;
+            }
+            let axis: Vector3<f64> = rotation.column(2).into();
+            axes.push(axis);
+            origins.push(origin);
+            if self.slides[joint] {
+                origin += axis * joints[joint];
+            } else {
+                let (sine, cosine) = libm::sincos(joints[joint]);
+                let (x, y): (Vector3<f64>, Vector3<f64>) = (rotation.column(0).into(), rotation.column(1).into());
+                rotation = Matrix3::from_columns(&[x * cosine + y * sine, y * cosine - x * sine, axis]);
+            }
+            frames.push(rotation);
+            let (mass, centre) = &self.centres[joint];
+            centres.push((*mass, origin + rotation * centre.coords));
+        }
+        let (mut forces, mut moments) = (vec![Vector3::zeros(); count], vec![Vector3::zeros(); count]);
+        // From the tip inwards: total weight, and its moment about the root's origin.
+        let mut force = self.gravity * payload_kg;
+        let mut moment = origin.cross(&force);
+        for joint in (0..count).rev() {
+            let (mass, centre) = centres[joint];
+            force += self.gravity * mass;
+            moment += centre.cross(&(self.gravity * mass));
+            forces[joint] = force;
+            moments[joint] = moment - origins[joint].cross(&force);
+        }
+        Posture { axes, frames, origins, tool: origin, tool_axes: rotation, forces, moments }
+    }
+}
+
+impl Posture {
+    /// Torque about the axis of `joint`, N·m.
+    #[must_use]
+    pub fn torque(&self, joint: usize) -> f64 {
+        self.axes[joint].dot(&self.moments[joint])
+    }
+
+    /// The moment across the axis of `joint`, N·m.
+    #[must_use]
+    pub fn moment_across(&self, joint: usize) -> Vector3<f64> {
+        self.moments[joint] - self.axes[joint] * self.torque(joint)
+    }
+
+    /// The force across the axis of `joint`, N.
+    #[must_use]
+    pub fn force_across(&self, joint: usize) -> Vector3<f64> {
+        let force = self.forces[joint];
+        force - self.axes[joint] * self.axes[joint].dot(&force)
+    }
+}

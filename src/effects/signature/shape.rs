@@ -1,0 +1,273 @@
+//! What an effect of unit magnitude does to the target: true pose = pose at the joint readings + effect, to first order.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::posture::Posture;
+
+/// What an effect follows. Joints and links count from 0; link `i` moves with joint `i`. One column per number in brackets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// \[1\] A joint turns in proportion to the torque about it.
+    Torque(usize),
+    /// \[1\] A turn about a joint's origin in proportion to the moment across its axis.
+    MomentAcross(usize),
+    /// \[1\] A joint is off by half a unit in the direction of its last move.
+    Direction(usize),
+    /// \[1\] A joint is off by half a unit in the direction of its torque.
+    TorqueSign(usize),
+    /// \[2\] Cosine and sine of so many times a joint's angle turn it.
+    Harmonic(usize, f64),
+    /// \[1\] A joint turns by the angle of another, or of its own.
+    Ratio {
+        /// The joint that errs.
+        joint: usize,
+        /// Whose angle counts.
+        source: usize,
+    },
+    /// \[1\] A link grows with its temperature; all, and the foot, where there is none.
+    Growth(Option<usize>),
+    /// \[1\] A joint turns with the temperature of its link.
+    Warmth(usize),
+    /// \[1\] A shift along the force across a joint's axis.
+    ForceAcrossSign(usize),
+    /// \[1\] A turn along the moment across a joint's axis.
+    MomentAcrossSign(usize),
+    /// \[6\] A twist of the base in proportion to time.
+    BaseDrift,
+    /// \[6\] A twist of the base from a row on.
+    BaseStep(usize),
+    /// \[3, 6 with attitudes\] A twist of the tool from a row on.
+    ToolStep(usize),
+    /// \[1\] Positions in proportion to themselves.
+    Scale,
+    /// \[1\] A joint is off where its angle is near a value (rad), within a half width (rad): a raised cosine.
+    Bump {
+        /// The joint.
+        joint: usize,
+        /// rad.
+        centre: f64,
+        /// rad.
+        half_width: f64,
+    },
+    /// \[2\] The moments about the x and y axes of a joint's frame turn it about z; the frame is that of the moving side or of the
+    /// side that the joint moves on.
+    Crosstalk {
+        /// The joint.
+        joint: usize,
+        /// The moving side.
+        moving: bool,
+    },
+    /// \[2\] Torque, and its cube, turn a joint.
+    Softening(usize),
+    /// \[2\] Torque, and the root of its size with its sign, turn a joint.
+    Hardening(usize),
+    /// \[1\] The torque of past readings, forgotten over a time ([`FORGETTING_S`]), turns a joint.
+    TorqueMemory(usize, usize),
+    /// \[2\] All joints yield alike, to the torque and to that of a mass that the tool carries besides.
+    AllYield,
+    /// \[1\] The direction of the last move, times the size of the torque.
+    DirectionLoad(usize),
+    /// \[1\] The direction of the last move that was long enough fades with a joint's way: Dahl's memory of a way (rad).
+    Memory(usize, f64),
+    /// \[2\] A joint turns with time and its square.
+    TimeCurve(usize),
+}
+
+/// A row of measurements as signatures see it.
+#[derive(Clone, Debug)]
+pub struct Reading {
+    /// The configuration.
+    pub posture: Posture,
+    /// Coordinates, rad or m.
+    pub joints: Vec<f64>,
+    /// Which joints slide.
+    pub slides: Vec<bool>,
+    /// Target on the tool, in root, m.
+    pub target: Vector3<f64>,
+    /// Direction of each joint's last move; empty where unknown.
+    pub approach: Vec<f64>,
+    /// Rise of each link's temperature, K; empty where unknown.
+    pub rise_k: Vec<f64>,
+    /// Rise of the foot's temperature, K.
+    pub foot_rise_k: f64,
+    /// Share of the session that has passed.
+    pub share: f64,
+    /// Place in time.
+    pub order: usize,
+    /// Each joint's torque as it is remembered, by [`FORGETTING_S`], N·m.
+    pub torque_memory: Vec<[f64; FORGETTING_S.len()]>,
+    /// Free fall, m/s².
+    pub gravity: Vector3<f64>,
+    /// Memory of each joint's moves, by [`MEMORIES`].
+    pub memory: Vec<[f64; MEMORIES.len()]>,
+}
+
+/// Ways (rad) over which a joint may forget.
+pub const MEMORIES: [f64; 2] = [0.4, 1.2];
+
+/// Times (s) over which a joint may yield.
+pub const FORGETTING_S: [f64; 3] = [25.0, 60.0, 150.0];
+
+/// Displacement of the target: shift (m) and turn (rad), in root.
+pub type Displacement = [f64; 6];
+
+fn twist(shift: Vector3<f64>, turn: Vector3<f64>) -> Displacement {
+    [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z]
+}
+
+impl Reading {
+    /// Torque (N·m) or, where the joint slides, the force along it (N).
+    fn effort(&self, joint: usize) -> f64 {
+        if self.slides[joint] { self.posture.forces[joint].dot(&self.posture.axes[joint]) } else { self.posture.torque(joint) }
+    }
+
+    /// The joint moves by `amount`.
+    #[must_use]
+    pub fn moved(&self, joint: usize, amount: f64) -> Displacement {
+        let axis = self.posture.axes[joint] * amount;
+        if self.slides[joint] { twist(axis, Vector3::zeros()) } else { self.turned(joint, axis) }
+    }
+
+    /// Everything from the origin of `joint` on turns by the rotation vector `turn`.
+    fn turned(&self, joint: usize, turn: Vector3<f64>) -> Displacement {
+        twist(turn.cross(&(self.target - self.posture.origins[joint])), turn)
+    }
+}
+
+impl Shape {
+    /// The columns at `reading`. `attitude`: whether attitudes are measured.
+    #[must_use]
+    pub fn columns(&self, reading: &Reading, attitude: bool) -> Vec<Displacement> {
+        let posture = &reading.posture;
+        match *self {
+            Shape::Torque(joint) => vec![reading.moved(joint, reading.effort(joint))],
+            Shape::MomentAcross(joint) => vec![reading.turned(joint, posture.moment_across(joint))],
+            Shape::Direction(joint) => vec![reading.moved(joint, 0.5 * reading.approach[joint])],
+            Shape::TorqueSign(joint) => {
+                let effort = reading.effort(joint);
+                // Where there is next to no load nothing seats the gear.
+                let sign = if effort.abs() < 1e-6 { 0.0 } else { effort.signum() };
+                vec![reading.moved(joint, 0.5 * sign)]
+            }
+            Shape::Harmonic(joint, order) => {
+                let (sine, cosine) = libm::sincos(order * reading.joints[joint]);
+                vec![reading.moved(joint, cosine), reading.moved(joint, sine)]
+            }
+            Shape::Ratio { joint, source } => vec![reading.moved(joint, reading.joints[source])],
+            Shape::Growth(link) => {
+                let count = reading.joints.len();
+                let end = |link: usize| if link + 1 < count { posture.origins[link + 1] } else { reading.target };
+                let grown = |link: usize| (end(link) - posture.origins[link]) * reading.rise_k[link];
+                let shift = match link {
+                    Some(link) => grown(link),
+                    None => posture.origins[0] * reading.foot_rise_k + (0..count).map(grown).sum::<Vector3<f64>>(),
+                };
+                vec![twist(shift, Vector3::zeros())]
+            }
+            Shape::Warmth(joint) => vec![reading.moved(joint, reading.rise_k[joint])],
+            Shape::ForceAcrossSign(joint) => {
+                vec![twist(unit(posture.force_across(joint)), Vector3::zeros())]
+            }
+            Shape::MomentAcrossSign(joint) => vec![reading.turned(joint, unit(posture.moment_across(joint)))],
+            Shape::BaseDrift => base_twist(reading, reading.share),
+            Shape::BaseStep(row) => base_twist(reading, f64::from(u8::from(reading.order >= row))),
+            Shape::ToolStep(row) => tool_twist(reading, f64::from(u8::from(reading.order >= row)), attitude),
+            Shape::Scale => vec![twist(reading.target, Vector3::zeros())],
+            Shape::Bump { joint, centre, half_width } => {
+                let distance = (reading.joints[joint] - centre).abs() / half_width;
+                let height = if distance < 1.0 { 0.5 * (1.0 + libm::cos(std::f64::consts::PI * distance)) } else { 0.0 };
+                vec![reading.moved(joint, height)]
+            }
+            Shape::Crosstalk { joint, moving } => {
+                let mut frame = posture.frames[joint];
+                if !moving {
+                    // Back by the joint's angle about z.
+                    let (sine, cosine) = libm::sincos(reading.joints[joint]);
+                    let (x, y): (Vector3<f64>, Vector3<f64>) = (frame.column(0).into(), frame.column(1).into());
+                    frame = Matrix3::from_columns(&[x * cosine - y * sine, y * cosine + x * sine, posture.axes[joint]]);
+                }
+                [0, 1].map(|axis| reading.moved(joint, frame.column(axis).dot(&posture.moments[joint]))).to_vec()
+            }
+            Shape::Softening(joint) => {
+                let effort = reading.effort(joint);
+                vec![reading.moved(joint, effort), reading.moved(joint, effort * effort * effort / 1e4)]
+            }
+            Shape::Hardening(joint) => {
+                let effort = reading.effort(joint);
+                let root = 10.0 * libm::sqrt(effort.abs()) * effort.signum();
+                vec![reading.moved(joint, effort), reading.moved(joint, root)]
+            }
+            Shape::TorqueMemory(joint, which) => vec![reading.moved(joint, reading.torque_memory[joint][which])],
+            Shape::AllYield => {
+                let joints = 0..reading.joints.len();
+                let own: Vec<Displacement> = joints.clone().map(|joint| reading.moved(joint, reading.effort(joint))).collect();
+                let of_mass = joints
+                    .map(|joint| {
+                        let axis = posture.axes[joint];
+                        let lever = posture.tool - posture.origins[joint];
+                        let force = reading.gravity;
+                        let effort = if reading.slides[joint] { force.dot(&axis) } else { axis.dot(&lever.cross(&force)) };
+                        reading.moved(joint, effort)
+                    })
+                    .collect::<Vec<_>>();
+                let sum = |parts: Vec<Displacement>| {
+                    parts.iter().fold([0.0; 6], |sum, part| std::array::from_fn(|at| sum[at] + part[at]))
+                };
+                vec![sum(own), sum(of_mass)]
+            }
+            Shape::DirectionLoad(joint) => {
+                vec![reading.moved(joint, 0.5 * reading.approach[joint] * reading.effort(joint).abs())]
+            }
+            Shape::Memory(joint, way) => {
+                let which = MEMORIES.iter().position(|known| *known == way).unwrap_or(0);
+                vec![reading.moved(joint, reading.memory[joint][which])]
+            }
+            Shape::TimeCurve(joint) => {
+                vec![reading.moved(joint, reading.share), reading.moved(joint, reading.share * reading.share)]
+            }
+        }
+    }
+
+    /// Number of columns.
+    #[must_use]
+    pub fn width(&self, attitude: bool) -> usize {
+        match self {
+            Shape::Harmonic(..)
+            | Shape::Crosstalk { .. }
+            | Shape::Softening(_)
+            | Shape::Hardening(_)
+            | Shape::AllYield
+            | Shape::TimeCurve(_) => 2,
+            Shape::BaseDrift | Shape::BaseStep(_) => 6,
+            Shape::ToolStep(_) => {
+                if attitude {
+                    6
+                } else {
+                    3
+                }
+            }
+            _ => 1,
+        }
+    }
+}
+
+fn unit(vector: Vector3<f64>) -> Vector3<f64> {
+    vector.try_normalize(1e-9).unwrap_or_else(Vector3::zeros)
+}
+
+fn base_twist(reading: &Reading, factor: f64) -> Vec<Displacement> {
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| axis * factor);
+    let shifts = axes.map(|axis| twist(axis, Vector3::zeros()));
+    let turns = axes.map(|axis| twist(axis.cross(&reading.target), axis));
+    [shifts, turns].concat()
+}
+
+fn tool_twist(reading: &Reading, factor: f64, attitude: bool) -> Vec<Displacement> {
+    let lever = reading.target - reading.posture.tool;
+    let axes = [0, 1, 2].map(|axis| Vector3::from(reading.posture.tool_axes.column(axis)) * factor);
+    let mut columns = axes.map(|axis| twist(axis, Vector3::zeros())).to_vec();
+    if attitude {
+        columns.extend(axes.map(|axis| twist(axis.cross(&lever), axis)));
+    }
+    columns
+}

@@ -1,0 +1,177 @@
+//! A diagnosis for people: the verdict in a sentence, the waterfall, the causes, where, and what to measure next.
+
+use super::{number, table};
+use crate::diagnosis::outcome::{Candidate, Diagnosis, Map, NoiseSource, Place};
+use crate::effects::Level;
+
+/// The whole report.
+#[must_use]
+pub fn text(diagnosis: &Diagnosis) -> String {
+    let mut text = format!("{}\n\n", diagnosis.sentence);
+    text.push_str(&waterfall(diagnosis));
+    if !diagnosis.effects.is_empty() {
+        text.push('\n');
+        text.push_str(&causes(diagnosis));
+        text.push('\n');
+    }
+    for set in &diagnosis.confusion_sets {
+        text.push_str("\nThese cannot be told apart:\n");
+        text.push_str(&candidates(set));
+        text.push('\n');
+    }
+    if diagnosis.unknown.present {
+        let place = diagnosis.unknown.r#where.clone().unwrap_or_default();
+        text.push_str(&format!("\nUnknown: {place} (p = {}).\n", number(diagnosis.unknown.p_value)));
+    }
+    text.push_str("\nWhat remains along each joint's motion, over its travel (each step two standard errors):\n");
+    for map in &diagnosis.maps {
+        text.push_str(&format!("  joint {:<2} {}\n", map.joint, picture(map)));
+    }
+    if !diagnosis.undetectable.is_empty() {
+        text.push_str(&format!("\nNot to be seen in these readings: {}.\n", blind(diagnosis)));
+    }
+    if !diagnosis.next_measurements.is_empty() {
+        text.push_str("\nMeasure next:\n");
+        for next in &diagnosis.next_measurements {
+            text.push_str(&format!("  - {next}\n"));
+        }
+    }
+    for note in &diagnosis.notes {
+        text.push_str(&format!("Note: {note}.\n"));
+    }
+    text
+}
+
+fn um(metres: f64) -> String {
+    number(metres * 1e6)
+}
+
+fn waterfall(diagnosis: &Diagnosis) -> String {
+    let gap = &diagnosis.gap;
+    let source = match diagnosis.noise_floor.source {
+        NoiseSource::Repeats => "from repeats",
+        NoiseSource::Declared => "declared",
+        NoiseSource::Assumed => "assumed",
+    };
+    let most = gap.nominal_rms_m.max(gap.noise_rms_m).max(1e-12);
+    // Lengths of bars are logarithmic: each step is half as long.
+    let bar = |value: f64| {
+        let length = 24.0 + 4.0 * libm::log2((value / most).max(1e-9));
+        "█".repeat(length.clamp(1.0, 24.0) as usize)
+    };
+    let mut rows = vec![
+        vec!["nominal (base and tool fitted)".to_owned(), um(gap.nominal_rms_m), bar(gap.nominal_rms_m)],
+        vec!["geometry".to_owned(), um(gap.geometry_rms_m), bar(gap.geometry_rms_m)],
+    ];
+    for effect in &diagnosis.effects {
+        if effect.held_out_rms_after_m != effect.held_out_rms_before_m {
+            let name = format!("+ {} {}", effect.kind, place(&effect.location));
+            rows.push(vec![name, um(effect.held_out_rms_after_m), bar(effect.held_out_rms_after_m)]);
+        }
+    }
+    rows.push(vec!["all that each fold chose".to_owned(), um(gap.explained_rms_m), bar(gap.explained_rms_m)]);
+    rows.push(vec![format!("noise floor ({source})"), um(gap.noise_rms_m), bar(gap.noise_rms_m)]);
+    let mut text = table(&[&format!("held out, {} folds", gap.folds), "RMS, µm", ""], rows);
+    text.push('\n');
+    if let Some(closed) = gap.gap_closed {
+        let interval = gap
+            .gap_closed_ci95
+            .map(|[low, high]| format!(" (95 %: {:.0} to {:.0} %)", 100.0 * low, 100.0 * high))
+            .unwrap_or_default();
+        text.push_str(&format!("Of the gap between geometry and noise, {:.0} % is closed{interval}.\n", 100.0 * closed));
+    }
+    text
+}
+
+fn causes(diagnosis: &Diagnosis) -> String {
+    let rows = diagnosis
+        .effects
+        .iter()
+        .map(|effect| {
+            let magnitude = &effect.magnitude;
+            let (unit, factor) = shown(&magnitude.unit);
+            vec![
+                effect.kind.clone(),
+                place(&effect.location),
+                format!("{:.1} %", 100.0 * effect.probability),
+                format!("{} {unit}", number(magnitude.value * factor)),
+                format!("{} to {}", number(magnitude.ci95[0] * factor), number(magnitude.ci95[1] * factor)),
+                effect.gap_closed.map_or_else(|| "–".to_owned(), |closed| format!("{:.0} %", 100.0 * closed)),
+                format!("{} of {}", effect.folds[0], effect.folds[1]),
+                effect.detail.clone(),
+            ]
+        })
+        .collect();
+    table(&["cause", "where", "probability", "magnitude", "95 %", "of its gap", "folds", ""], rows)
+}
+
+/// A unit for people, and the factor to it.
+fn shown(unit: &str) -> (&str, f64) {
+    match unit {
+        "m" => ("µm", 1e6),
+        "rad" => ("µrad", 1e6),
+        "rad/(N·m)" => ("µrad/(N·m)", 1e6),
+        "rad/rad" => ("µrad/rad", 1e6),
+        "1/K" => ("µm/(m·K)", 1e6),
+        "rad/K" => ("µrad/K", 1e6),
+        "1" => ("%", 1e2),
+        other => (other, 1.0),
+    }
+}
+
+fn place(place: &Place) -> String {
+    let level = match place.level {
+        Level::Joint => "joint",
+        Level::Link => "link",
+        Level::Base => "base",
+        Level::Tool => "tool",
+        Level::Sensor => "sensor",
+    };
+    let at = match (place.level, place.index) {
+        (_, Some(index)) => format!("{level} {index}"),
+        (Level::Link, None) => "all links".to_owned(),
+        _ => level.to_owned(),
+    };
+    match place.time_s {
+        Some(time) => format!("{at}, {time:.0} s"),
+        None => at,
+    }
+}
+
+fn candidates(set: &[Candidate]) -> String {
+    let rows = set
+        .iter()
+        .map(|one| vec![one.kind.clone(), place(&one.location), format!("{:.1} %", 100.0 * one.probability), one.detail.clone()])
+        .collect();
+    table(&["kind", "where", "probability", ""], rows)
+}
+
+/// A map as a line: 0 to 4 steps of two standard errors above or below nothing.
+fn picture(map: &Map) -> String {
+    let mut text = String::new();
+    for (mean, error) in map.mean.iter().zip(&map.standard_error) {
+        let steps = if *error > 0.0 { mean / (2.0 * error) } else { 0.0 };
+        text.push(match steps {
+            steps if steps >= 3.0 => '▲',
+            steps if steps >= 1.5 => '△',
+            steps if steps <= -3.0 => '▼',
+            steps if steps <= -1.5 => '▽',
+            _ => '·',
+        });
+    }
+    text
+}
+
+/// Kinds with the places at which they cannot be seen.
+fn blind(diagnosis: &Diagnosis) -> String {
+    let mut kinds: Vec<(&str, Vec<String>)> = Vec::new();
+    for one in &diagnosis.undetectable {
+        let index = one.location.index.map(|index| index.to_string()).unwrap_or_default();
+        match kinds.iter_mut().find(|(kind, _)| *kind == one.kind) {
+            Some((_, places)) => places.push(index),
+            None => kinds.push((&one.kind, vec![index])),
+        }
+    }
+    let said: Vec<String> = kinds.iter().map(|(kind, places)| format!("{kind} {}", places.join(",")).trim().to_owned()).collect();
+    said.join("; ")
+}
