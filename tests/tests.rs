@@ -11,6 +11,8 @@ mod chain;
 mod challenge;
 #[path = "integration/determinism.rs"]
 mod determinism;
+#[path = "integration/diagnose.rs"]
+mod diagnose;
 #[path = "integration/harness.rs"]
 mod harness;
 #[path = "integration/killed.rs"]

@@ -128,12 +128,12 @@ pub fn fit(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], weights: &
     let mut measurement_from_root = registration(&from, &to).ok_or(DiagnosisError::Degenerate)?;
     if attitude {
         // The first reading of each target tells its attitude well enough to start from.
-        for target in 0..targets_named.len() {
+        for (target, turn) in turns.iter_mut().enumerate() {
             if let Some(row) = which.iter().position(|known| *known == target) {
                 let posture = mechanism.posture(&measurements[row].joints, 0.0);
                 let tool = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(posture.tool_axes));
                 let measured = measurements[row].attitude().unwrap_or_default();
-                turns[target] = (measurement_from_root.rotation * tool).inverse() * measured;
+                *turn = (measurement_from_root.rotation * tool).inverse() * measured;
             }
         }
     }
@@ -237,7 +237,7 @@ pub fn fit(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], weights: &
                     / measurements.len() as f64,
             );
             let reach: f64 = mechanism.segments.iter().map(|segment| segment.translation.vector.norm()).sum();
-            if !(rms < 0.05 * reach.max(0.1)) {
+            if rms.is_nan() || rms >= 0.05 * reach.max(0.1) {
                 return Err(DiagnosisError::NotThisRobot { rms_mm: rms * 1e3 });
             }
             return Ok(Rows {

@@ -249,7 +249,7 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
     let confusion_sets = confusion(analysis);
 
     // Power.
-    if level > 2.25 || level < 0.44 {
+    if !(0.44..=2.25).contains(&level) {
         notes.push(format!("the residuals are {:.2} times the {} noise", libm::sqrt(level), word(source)));
     }
     let (undetectable, detectable, share) = detectability(analysis, level);

@@ -93,8 +93,7 @@ impl Mechanism {
         let mut centres = Vec::with_capacity(count);
         let mut rotation = Matrix3::identity();
         let mut origin = Vector3::zeros();
-        for joint in 0..=count {
-            let segment = &self.segments[joint];
+        for (joint, segment) in self.segments.iter().enumerate() {
             origin += rotation * segment.translation.vector;
             rotation *= segment.rotation.to_rotation_matrix().into_inner();
             if joint == count {

@@ -1,0 +1,83 @@
+//! `kincal diagnose`: recordings and tables in, one object and an exit code out.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::harness::kincal;
+
+/// A case with backlash, as a recording in `folder`.
+fn case(folder: &Path) -> String {
+    let arguments = ["challenge", "new", "--seed", "7391284650193849", "--cases", "1", "--kinds", "backlash", "--effects", "1"];
+    kincal(folder, &arguments).ends(0);
+    folder.join("case-0001.mcap").to_str().unwrap().to_owned()
+}
+
+#[test]
+fn a_recording_and_its_table_get_the_same_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = case(folder.path());
+    let ran = kincal(folder.path(), &["diagnose", &case, "--json"]);
+    let json = ran.json();
+    let verdict = json["verdict"].as_str().unwrap();
+    let good = ["no_gap", "explained"].contains(&verdict);
+    assert_eq!(ran.code, Some(i32::from(!good)), "{verdict}");
+    // Bytes do not depend on the number of threads.
+    assert_eq!(kincal(folder.path(), &["diagnose", &case, "--json", "--threads", "1"]).stdout, ran.stdout);
+
+    kincal(folder.path(), &["export", &case, "--to", "csv"]).ends(0);
+    kincal(folder.path(), &["export", &case, "--to", "toml"]).ends(0);
+    let [table, scene] = ["csv", "toml"].map(|end| {
+        let path = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path());
+        path.into_iter().find(|path| path.extension().is_some_and(|found| found == end)).unwrap().to_str().unwrap().to_owned()
+    });
+    let sigma = format!("{}", json["noise_floor"]["position_m"].as_f64().unwrap() * 1e6);
+    let from_table =
+        kincal(folder.path(), &["diagnose", &table, "--robot", &scene, "--position-noise-um", &sigma, "--json"]).json();
+    assert_eq!(from_table["verdict"], json["verdict"]);
+    let causes = |json: &Value| -> Vec<(Value, Value)> {
+        json["effects"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|effect| (effect["kind"].clone(), effect["location"]["index"].clone()))
+            .collect()
+    };
+    assert_eq!(causes(&from_table), causes(&json));
+
+    // Without the columns that it needs a kind is switched off, and that is said.
+    let text = fs::read_to_string(&table).unwrap();
+    let names: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+    let keep: Vec<usize> = (0..names.len()).filter(|at| !names[*at].starts_with("approach")).collect();
+    let fewer: Vec<String> = text
+        .lines()
+        .map(|line| {
+            let cells: Vec<&str> = line.split(',').collect();
+            keep.iter().map(|at| cells[*at]).collect::<Vec<_>>().join(",")
+        })
+        .collect();
+    let bare = folder.path().join("bare.csv");
+    fs::write(&bare, fewer.join("\n")).unwrap();
+    let blind = kincal(folder.path(), &["diagnose", bare.to_str().unwrap(), "--robot", &scene, "--json"]).json();
+    let notes = blind["notes"].to_string();
+    assert!(notes.contains("no approach directions"), "{notes}");
+    assert!(blind["effects"].as_array().unwrap().iter().all(|effect| effect["kind"] != "backlash"));
+    let undetectable = blind["undetectable"].as_array().unwrap();
+    assert!(undetectable.iter().any(|one| one["kind"] == "backlash" && one["reason"] == "no approach directions were recorded"));
+}
+
+#[test]
+fn the_report_begins_with_the_verdict_and_bad_input_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = case(folder.path());
+    let report = kincal(folder.path(), &["diagnose", &case]).stdout;
+    assert!(report.lines().next().unwrap().ends_with('.'), "{report}");
+    assert!(report.contains("noise floor"), "{report}");
+    let refused = |arguments: &[&str]| kincal(folder.path(), &[&["diagnose"], arguments].concat()).ends(2).stderr;
+    assert!(refused(&[&case, "--without", "gremlins"]).contains("no such kind; known are joint_compliance"));
+    assert!(refused(&[&case, "--robot", "x.urdf"]).contains("carries its own nominal arm"));
+    let table = folder.path().join("few.csv");
+    fs::write(&table, "q1_rad,x_m,y_m,z_m\n0,1,0,0\n").unwrap();
+    assert!(refused(&[table.to_str().unwrap()]).contains("give its nominal robot with --robot"));
+}
