@@ -267,7 +267,7 @@ fn of_arm(arm: &Arm, case: &Case, planned: &[Planned]) -> Result<Line, Validatio
     let mut physical = PhysicalArm::new(arm, &nominal, &case.effects, Settling::default())?;
     let mut still = PhysicalArm::new(arm, &nominal, &[], Settling::default())?;
     let statics = Statics::new(arm);
-    let memories: Vec<Vec<f64>> = case.effects.iter().map(|effect| statics.remembered(effect, planned)).collect();
+    let memories: Vec<Vec<f64>> = case.effects.iter().map(|effect| statics.remembered(effect, &case.effects, planned)).collect();
     let mut all = Deviations::default();
     for (index, row) in planned.iter().enumerate() {
         let settled = physical.settle(&conditions(index));
@@ -687,8 +687,9 @@ impl<'a> Statics<'a> {
         at.map_or_else(Vector3::zeros, |at| self.chain.frames(&vec![0.0; self.arm.joint_count()])[at].translation.vector)
     }
 
-    /// What an effect with a memory has left at each row of the session, integrated in small steps; zeros for all others.
-    fn remembered(&self, effect: &Effect, planned: &[Planned]) -> Vec<f64> {
+    /// What an effect with a memory, one of `effects`, has left at each row of the session, integrated in small steps; zeros for all
+    /// others.
+    fn remembered(&self, effect: &Effect, effects: &[Effect], planned: &[Planned]) -> Vec<f64> {
         match *effect {
             Effect::CreepAfterMotion { joint, compliance, time_constant } => {
                 let goals: Vec<f64> = planned
@@ -696,7 +697,7 @@ impl<'a> Statics<'a> {
                     .map(|row| {
                         let standing = self.standing(&row.joints);
                         let still = vec![Pose::identity(); row.joints.len() + 1];
-                        let wrench = self.wrenches(&standing, &still, row.payload_kg)[joint];
+                        let wrench = self.wrenches(&standing, &still, Self::payload_kg(effects, row))[joint];
                         let turns = self.arm.chain.joints[joint].kind == JointKind::Revolute;
                         compliance * if turns { wrench.moment.z } else { wrench.force.z }
                     })
