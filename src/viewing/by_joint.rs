@@ -43,24 +43,26 @@ struct Part {
 fn parts(arm: &Arm, measurements: &[Measurement], residuals: &[Residual]) -> Vec<Vec<Part>> {
     let at = arm.chain.at_nominal();
     let mut parts: Vec<Vec<Part>> = (0..arm.joint_count()).map(|_| Vec::new()).collect();
-    let rows: Vec<(&Measurement, Vector3<f64>, Vec<Vector3<f64>>)> = residuals
+    let rows: Vec<(&Measurement, &Residual)> = residuals
         .iter()
-        .filter_map(|residual| {
-            let measurement = measurements.iter().find(|measurement| measurement.index == residual.index)?;
-            let [x, y, z, ..] = residual.identified;
-            let ways = at.joint_jacobian(&measurement.joints).iter().map(|column| column.fixed_rows::<3>(0).into()).collect();
-            Some((measurement, Vector3::new(x, y, z), ways))
-        })
+        .filter_map(|residual| Some((measurements.iter().find(|measurement| measurement.index == residual.index)?, residual)))
         .collect();
-    let longest = rows.iter().flat_map(|(_, _, ways)| ways).map(Vector3::norm).fold(0.0, f64::max);
-    for (measurement, residual, ways) in rows {
+    // How each joint would move the end point, per rad or m.
+    let ways: Vec<Vec<Vector3<f64>>> = rows
+        .iter()
+        .map(|(row, _)| at.joint_jacobian(&row.joints).iter().map(|column| column.fixed_rows::<3>(0).into()).collect())
+        .collect();
+    let longest = ways.iter().flatten().map(Vector3::norm).fold(0.0, f64::max);
+    for ((measurement, residual), ways) in rows.iter().zip(&ways) {
+        let [x, y, z, ..] = residual.identified;
         for (joint, way) in ways.iter().enumerate().filter(|(_, way)| way.norm() > SHORTEST * longest) {
             let approach = match measurement.approach.get(joint) {
                 Some(..=-1) => 0,
                 Some(1..) => 2,
                 _ => 1,
             };
-            parts[joint].push(Part { at: measurement.joints[joint], by: way.dot(&residual) / way.norm(), approach });
+            let by = way.dot(&Vector3::new(x, y, z)) / way.norm();
+            parts[joint].push(Part { at: measurement.joints[joint], by, approach });
         }
     }
     parts
