@@ -91,8 +91,10 @@ pub(crate) enum Command {
     )]
     Reproduce(ReproduceOptions),
     /// List the un-modelled effects that can be simulated, or check each against an independent solution
-    #[command(after_help = "Examples:\n  kincal effects                       what there is, where, in which unit and range\n  \
-        kincal effects scenes/arm8.toml      each on this arm against statics, 200 random configurations")]
+    #[command(
+        after_help = "Examples:\n  kincal effects                       what there is, where, in which unit and range, and its keys\n  \
+        kincal effects scenes/arm8.toml      each on this arm against statics, 200 random configurations"
+    )]
     Effects(EffectsOptions),
     /// What un-modelled effects do to a calibration: effect × place × magnitude × design × trials
     #[command(after_help = "Examples:\n  \

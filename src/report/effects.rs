@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use super::{number, table};
 use crate::effects::{Kind, Level};
 use crate::experiments::effect_validation::{Line, MARK_M, MARK_POSES_PER_S, MARK_RELATIVE, MARK_SETTLING_M};
+use crate::scene::effect_file::{KINDS, KindKeys};
 
 /// An effect that a scene may inject: kind, where it sits, unit of its magnitude, and what is realistic at about 1 m of reach.
 struct Entry {
@@ -72,11 +73,14 @@ pub fn library() -> String {
         [entry.kind, entry.place, entry.unit, entry.range, named].map(str::to_owned).to_vec()
     };
     let rows = entries().iter().map(row).collect();
+    let keys = KINDS.iter().map(|kind| vec![kind.kind.to_owned(), kind.keys(), kind.about.to_owned()]).collect();
     format!(
         "Effects that a scene can inject ([[injected.effect]]); true pose = pose at the readings + effect.\n{}\n\
          Magnitudes are those of results, in SI; a scene's keys carry their own units. Backlash and lost motion: full width; \
-         clearances: radius; drift and steps: length of the translation; outliers: share of the readings.",
-        table(&["kind", "place", "unit", "realistic", "known to the diagnosis"], rows)
+         clearances: radius; drift and steps: length of the translation; outliers: share of the readings.\n\n\
+         Keys of a table [[injected.effect]], besides kind; [in brackets]: may be left out.\n{}",
+        table(&["kind", "place", "unit", "realistic", "known to the diagnosis"], rows),
+        table(&["kind", "keys", "what happens"], keys)
     )
 }
 
@@ -92,7 +96,11 @@ pub fn library_json() -> Value {
             "known_to_the_diagnosis": entry.known,
         })
     };
-    json!({ "effects": entries().iter().map(entry).collect::<Vec<_>>() })
+    let keys = |kind: &KindKeys| json!({ "kind": kind.kind, "keys": kind.keys(), "about": kind.about });
+    json!({
+        "effects": entries().iter().map(entry).collect::<Vec<_>>(),
+        "scene_keys": KINDS.iter().map(keys).collect::<Vec<_>>(),
+    })
 }
 
 /// The table of the validation, with the marks.
