@@ -126,20 +126,26 @@ pub fn real_robot(start: &Start, real: &RealCell) -> Result<(Arm, Vec<String>), 
     }
 }
 
-/// Places the nominal robot `robot` in the measurement frame of `measurements`.
-///
-/// # Errors
-/// If the measurements do not tell where it stands.
-pub fn real_arm(real: &RealCell, robot: (Arm, Vec<String>), measurements: &[Measurement]) -> Result<RealArm, SessionError> {
+/// The sensor of a real cell: as declared, attitudes where all rows have them.
+#[must_use]
+pub fn real_sensor(real: &RealCell, measurements: &[Measurement]) -> Sensor {
     let attitude = measurements.iter().all(|measurement| measurement.attitude_xyzw.is_some());
-    let sensor = Sensor {
+    Sensor {
         position_in_base: nalgebra::Point3::origin(),
         position_sigma_m: real.position_sigma_m,
         position_sigma_per_m: 0.0,
         attitude_sigma_rad: attitude.then_some(real.attitude_sigma_rad),
         temperature_sigma_k: None,
         view: None,
-    };
+    }
+}
+
+/// Places the nominal robot `robot` in the measurement frame of `measurements`.
+///
+/// # Errors
+/// If the measurements do not tell where it stands.
+pub fn real_arm(real: &RealCell, robot: (Arm, Vec<String>), measurements: &[Measurement]) -> Result<RealArm, SessionError> {
+    let sensor = real_sensor(real, measurements);
     let fit: Vec<&Measurement> = measurements.iter().filter(|measurement| measurement.role == Role::Fit).collect();
     let (nominal, notes) = robot;
     Ok(RealArm { arm: align(&nominal, &sensor, &fit)?, sensor, notes })

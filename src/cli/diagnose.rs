@@ -10,7 +10,6 @@ use crate::diagnosis::outcome::{NoiseSource, Verdict};
 use crate::diagnosis::{self, Options};
 use crate::effects::Kind;
 use crate::measurement::{Measurement, Sensor, table};
-use crate::recording::event::RealCell;
 use crate::{report, scene, session};
 
 pub(crate) fn command(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Outcome> {
@@ -53,7 +52,7 @@ fn subject(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Subject
         return match &start.real {
             Some(real) => {
                 let (arm, notes) = session::real_robot(&start, real).with_context(|| options.input.display().to_string())?;
-                let sensor = sensor(real, &measurements);
+                let sensor = session::real_sensor(real, &measurements);
                 Ok(Subject { arm, sensor, noise: NoiseSource::Declared, measurements, notes })
             }
             None => {
@@ -70,19 +69,6 @@ fn subject(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Subject
     input::check_units(&options.input, &table, &arm)?;
     input::check_joints(&options.input, &table.measurements, arm.joint_count())?;
     let noise = if options.robot.position_noise_um.is_some() { NoiseSource::Declared } else { NoiseSource::Assumed };
-    let sensor = sensor(&real, &table.measurements);
+    let sensor = session::real_sensor(&real, &table.measurements);
     Ok(Subject { arm, sensor, noise, measurements: table.measurements, notes })
-}
-
-/// The sensor of a real cell: as declared, attitudes where all rows have them.
-fn sensor(real: &RealCell, measurements: &[Measurement]) -> Sensor {
-    let attitude = measurements.iter().all(|measurement| measurement.attitude_xyzw.is_some());
-    Sensor {
-        position_in_base: nalgebra::Point3::origin(),
-        position_sigma_m: real.position_sigma_m,
-        position_sigma_per_m: 0.0,
-        attitude_sigma_rad: attitude.then_some(real.attitude_sigma_rad),
-        temperature_sigma_k: None,
-        view: None,
-    }
 }
