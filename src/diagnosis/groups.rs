@@ -185,11 +185,8 @@ pub fn weights(groups: &Groups, residual: &[f64], per_row: usize, good: &[bool])
     if freedom == 0.0 {
         return (vec![1.0; groups.of.len()], 0.0);
     }
-    let correlation = if freedom < PAIRS || all <= 0.0 {
-        0.5
-    } else {
-        (1.0 - (within / freedom) / (all / count)).clamp(0.0, 1.0)
-    };
+    let correlation =
+        if freedom < PAIRS || all <= 0.0 { 0.5 } else { (1.0 - (within / freedom) / (all / count)).clamp(0.0, 1.0) };
     let weight = |row: usize| 1.0 / (1.0 + (groups.rows[groups.of[row]].len() - 1) as f64 * correlation);
     ((0..groups.of.len()).map(weight).collect(), correlation)
 }

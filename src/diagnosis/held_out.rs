@@ -144,7 +144,8 @@ pub fn schemes(measurements: &[&Measurement], targets: &[Vector3<f64>], groups: 
     for (by, fold) in [(Block::Payload, at_payload), (Block::Session, at_session)] {
         let scheme = Scheme::new(by, fold);
         // What is left must still tell where the arm stands.
-        let enough = (0..scheme.folds).all(|out| 2 * scheme.fold.iter().filter(|fold| **fold != out).count() >= scheme.fold.len() / 2);
+        let enough =
+            (0..scheme.folds).all(|out| 2 * scheme.fold.iter().filter(|fold| **fold != out).count() >= scheme.fold.len() / 2);
         if scheme.folds > 1 && enough {
             schemes.push(scheme);
         }
