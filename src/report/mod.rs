@@ -1,6 +1,7 @@
 //! Results as tables and figures for people. Units are in the headers; machines get the same results as JSON.
 
 pub mod challenge;
+pub mod confirm;
 pub mod diagnosis;
 pub mod effects;
 pub mod findings;
