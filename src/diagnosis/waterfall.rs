@@ -111,8 +111,7 @@ impl<'a> Waterfall<'a> {
             .map(|number| {
                 let held = |row: &usize| self.fold[*row] == number;
                 // What weighs nothing has no part in the fit, and its residual is the prediction's error.
-                let weights: Vec<f64> =
-                    (0..changed.len()).map(|row| if held(&row) { 0.0 } else { self.weights[row] }).collect();
+                let weights: Vec<f64> = (0..changed.len()).map(|row| if held(&row) { 0.0 } else { self.weights[row] }).collect();
                 let fitted = rows::fit(self.arm, self.sensor, &changed, &weights)?;
                 let counted: Vec<usize> = (0..changed.len()).filter(|row| held(row) && self.good[*row]).collect();
                 let square = |row: &usize| fitted.residual.fixed_rows::<3>(row * fitted.per_row).norm_squared();

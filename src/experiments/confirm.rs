@@ -20,6 +20,7 @@ use crate::frames::{Pose, rotation_vector};
 use crate::kinematics::Step as ChainStep;
 use crate::measurement::{Measurement, Sensor};
 use crate::physics::{Conditions, PhysicalArm, PhysicsError, Settling, Stop};
+use crate::report::micrometres as um;
 use crate::scene::effect::{Effect, Moves};
 
 /// Displacements agree where they differ by less than this share of the effect's,
@@ -200,7 +201,8 @@ pub fn confirm(
         confirmation.steps.push(step);
     }
     // Against the diagnosis' own number, where it says that nothing else is in it.
-    if let Some(last) = confirmation.steps.iter_mut().rev().find(|step| step.simulated).filter(|_| diagnosis.verdict == Verdict::Explained)
+    if let Some(last) =
+        confirmation.steps.iter_mut().rev().find(|step| step.simulated).filter(|_| diagnosis.verdict == Verdict::Explained)
         && last.disagreement.is_empty()
         && more(last.physics_rms_m, last.diagnosed_rms_m) > SHARE_OF_NOISE_HELD_OUT * noise_rms_m
     {
@@ -258,10 +260,6 @@ fn answer(steps: &[Step]) -> (Answer, String) {
         um(worst)
     );
     (Answer::Confirmed, sentence)
-}
-
-fn um(metres: f64) -> String {
-    crate::report::number(metres * 1e6)
 }
 
 /// What `large` has that `small` has not, of root mean squares.
@@ -501,4 +499,212 @@ fn fitted(arm: &Arm, rows: &Rows) -> Arm {
         });
     }
     arm
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cell::measure::measure;
+    use crate::diagnosis::outcome::{Magnitude, NoiseSource, Parameters};
+    use crate::diagnosis::{Options, diagnose};
+    use crate::effects::Level;
+    use crate::experiments::effect_validation::{ARCSEC, session};
+    use crate::experiments::injection::Sort;
+    use crate::recording::event::Nobody;
+    use crate::scene::{Injected, Scene};
+
+    fn scene() -> (Scene, Injected) {
+        let file = crate::scene::read(std::path::Path::new("scenes/gap.toml")).unwrap();
+        (file.scene, file.injected.unwrap())
+    }
+
+    /// Readings of the scene's true arm with `effects`, and what is said of them.
+    fn readings(effects: Vec<Effect>, count: usize) -> (Scene, Vec<Measurement>) {
+        let (scene, injected) = scene();
+        let planned = session(&scene.arm, count, 9);
+        let read = measure(&scene, &Injected { effects, ..injected }, &planned, planned.len(), &mut Nobody).unwrap();
+        (scene, read.0)
+    }
+
+    fn diagnosed(scene: &Scene, rows: &[&Measurement]) -> Diagnosis {
+        let options = Options { noise: NoiseSource::Declared, without: Vec::new() };
+        diagnose(&scene.arm, &scene.sensor, rows, &options).unwrap()
+    }
+
+    fn named(kind: Kind, index: Option<usize>, value: f64, parameters: Parameters) -> outcome::Effect {
+        outcome::Effect {
+            kind: kind.name().to_owned(),
+            location: Place { level: kind.level(), index, time_s: None },
+            probability: 1.0,
+            magnitude: Magnitude { value, unit: kind.unit().to_owned(), ci95: [value; 2] },
+            parameters,
+            held_out_rms_before_m: 0.0,
+            held_out_rms_after_m: 0.0,
+            gap_closed: None,
+            folds: [5, 5],
+            detail: String::new(),
+        }
+    }
+
+    /// Formulas and physics share no code: where they agree, every sign, phase, frame and change point is passed on as meant.
+    #[test]
+    fn every_kind_is_simulated_as_its_formula_means_it() {
+        let (scene, rows) = readings(Vec::new(), 40);
+        let rows: Vec<&Measurement> = rows.iter().collect();
+        let diagnosis = diagnosed(&scene, &rows);
+        let harmonic = |order, phase| Parameters { order: Some(order), phase_rad: Some(phase), ..Parameters::default() };
+        let leak = |source| Parameters { source: Some(source), ..Parameters::default() };
+        let twist = Parameters {
+            translation_m: Some([60e-6, -30e-6, 20e-6]),
+            rotation_rad: Some([20e-6, 50e-6, -40e-6]),
+            ..Parameters::default()
+        };
+        let step = Parameters { after: Some(16.5 / 39.0), row: Some(17), ..twist.clone() };
+        let lags = Parameters { sign: Some(-1.0), ..Parameters::default() };
+        let none = Parameters::default;
+        let cases = [
+            (Kind::JointCompliance, Some(2), 2e-5, none(), 0.02),
+            (Kind::LinkBending, Some(3), 2e-5, none(), 0.02),
+            (Kind::Backlash, Some(3), 3e-4, lags, 1e-3),
+            (Kind::GravityLostMotion, Some(4), 3e-4, none(), 1e-3),
+            (Kind::JointEccentricity, Some(2), 2e-4, harmonic(1.0, 0.7), 1e-3),
+            (Kind::JointEccentricity, Some(5), 2e-4, harmonic(2.0, -2.1), 1e-3),
+            (Kind::StrainWaveError, Some(3), 1e-4, harmonic(200.0, 1.3), 1e-3),
+            (Kind::GearCoupling, Some(3), -2e-4, leak(3), 2e-3),
+            (Kind::GearCoupling, Some(4), 2e-4, leak(3), 2e-3),
+            (Kind::LinkThermalGrowth, Some(3), 18e-6, none(), 1e-3),
+            // To the target in the formula, to the tool's origin in the physics.
+            (Kind::LinkThermalGrowth, None, 18e-6, none(), 0.02),
+            (Kind::JointThermalDrift, Some(2), -15e-6, none(), 1e-3),
+            (Kind::RadialClearance, Some(2), 40e-6, none(), 0.02),
+            (Kind::TiltClearance, Some(2), 1e-4, none(), 0.02),
+            (Kind::BaseDrift, None, 7e-5, twist, 1e-3),
+            (Kind::BaseStep, None, 7e-5, step.clone(), 1e-3),
+            (Kind::ToolStep, None, 7e-5, step, 1e-3),
+        ];
+        for (kind, index, value, parameters, allowed) in cases {
+            let effects = vec![named(kind, index, value, parameters)];
+            let diagnosis = Diagnosis { effects, ..diagnosis.clone() };
+            let found = confirm(&diagnosis, &scene.arm, &scene.sensor, &rows).unwrap();
+            let step = &found.steps[0];
+            let share = step.difference_share.unwrap_or(1.0);
+            println!("{kind:?} {index:?}: {:?} m, {share:.2e}, {}", step.displacement_rms_m, step.reason);
+            assert!(step.simulated && step.displacement_rms_m.unwrap() > 5e-6 && share < allowed, "{step:?}");
+            assert_eq!(step.disagreement, "");
+        }
+    }
+
+    #[test]
+    fn without_effects_the_simulated_arm_is_the_fitted_one() {
+        let (scene, rows) = readings(Vec::new(), 40);
+        let rows: Vec<&Measurement> = rows.iter().collect();
+        let waterfall = Waterfall::new(&scene.arm, &scene.sensor, &rows).unwrap();
+        let simulator = Simulator::new(&scene.arm, &waterfall, &rows);
+        let ran = simulator.run(&[]).unwrap();
+        for ((pose, in_tool), target) in ran.poses.iter().zip(&simulator.targets).zip(&waterfall.rows.targets) {
+            assert!(((pose * in_tool).coords - target).norm() < 1e-9);
+        }
+        // And the folds are the diagnosis': what geometry leaves is the same but for the second order of a fit.
+        let own = diagnosed(&scene, &rows).gap.geometry_rms_m;
+        let here = waterfall.after(&vec![[0.0; 6]; rows.len()]).unwrap();
+        assert!((here / own - 1.0).abs() < 0.02, "{here} and {own}");
+    }
+
+    #[test]
+    fn backlash_is_confirmed_and_a_wrong_width_is_not() {
+        let width = 120.0 * ARCSEC;
+        let (scene, rows) = readings(vec![Effect::Backlash { joint: 2, width }], 60);
+        let rows: Vec<&Measurement> = rows.iter().collect();
+        let diagnosis = diagnosed(&scene, &rows);
+        assert_eq!(diagnosis.effects[0].kind, "backlash");
+        assert_eq!(diagnosis.effects[0].parameters.sign, Some(-1.0));
+        let confirmed = |diagnosis: &Diagnosis| confirm(diagnosis, &scene.arm, &scene.sensor, &rows).unwrap();
+        let found = confirmed(&diagnosis);
+        assert_eq!(found.verdict, Answer::Confirmed, "{}", found.sentence);
+        let last = found.steps.last().unwrap();
+        assert!((last.physics_rms_m - last.analytic_rms_m).abs() < 0.05 * found.noise_rms_m);
+        assert!(last.physics_rms_m < 0.8 * found.geometry_rms_m && last.physics_rms_m < 1.5 * found.noise_rms_m);
+        // The same with another width: formula and physics agree, but not with the readings.
+        let mut wrong = diagnosis.clone();
+        wrong.effects[0].magnitude.value *= 3.0;
+        let found = confirmed(&wrong);
+        assert_eq!(found.verdict, Answer::Disagrees, "{}", found.sentence);
+        assert!(found.sentence.contains("the magnitudes do not explain"), "{}", found.sentence);
+        // No play makes the output lead.
+        wrong.effects[0].parameters.sign = Some(1.0);
+        let found = confirmed(&wrong);
+        assert_eq!(found.verdict, Answer::NotSimulated, "{}", found.sentence);
+        assert!(found.steps[0].reason.contains("no play"));
+        wrong.effects.clear();
+        assert_eq!(confirmed(&wrong).verdict, Answer::NothingToConfirm);
+    }
+
+    #[test]
+    fn where_the_first_order_fails_it_is_said() {
+        let (scene, rows) = readings(Vec::new(), 40);
+        let rows: Vec<&Measurement> = rows.iter().collect();
+        let diagnosis = diagnosed(&scene, &rows);
+        let of = |effect| {
+            let diagnosis = Diagnosis { effects: vec![effect], ..diagnosis.clone() };
+            confirm(&diagnosis, &scene.arm, &scene.sensor, &rows).unwrap()
+        };
+        // So soft that the arm hangs elsewhere than where its torque was computed.
+        let soft = of(named(Kind::JointCompliance, Some(2), 1.0 / 800.0, Parameters::default()));
+        assert_eq!(soft.verdict, Answer::Disagrees, "{}", soft.sentence);
+        assert!(soft.steps[0].difference_share.unwrap() > SHARE_OF_DISPLACEMENT);
+        // What no arm has is refused by the physics, in its words.
+        let negative = of(named(Kind::JointCompliance, Some(2), -1e-5, Parameters::default()));
+        assert!(negative.steps[0].reason.contains("stiffness"), "{}", negative.steps[0].reason);
+    }
+
+    #[test]
+    fn what_cannot_be_simulated_is_said_and_its_formula_stands_in() {
+        let (mut scene, rows) = readings(Vec::new(), 40);
+        scene.arm.links.iter_mut().for_each(|link| link.inertial = None);
+        let rows: Vec<&Measurement> = rows.iter().collect();
+        let lags = Parameters { sign: Some(-1.0), ..Parameters::default() };
+        let effects = vec![
+            named(Kind::JointCompliance, Some(2), 1e-4, Parameters::default()),
+            named(Kind::Backlash, Some(3), 3e-4, lags),
+            named(Kind::MeasurementScale, None, 5e-5, Parameters::default()),
+            named(Kind::MeasurementOutliers, None, 0.1, Parameters::default()),
+        ];
+        let diagnosis = Diagnosis { effects, ..diagnosed(&scene, &rows) };
+        let found = confirm(&diagnosis, &scene.arm, &scene.sensor, &rows).unwrap();
+        let simulated: Vec<bool> = found.steps.iter().map(|step| step.simulated).collect();
+        assert_eq!(simulated, [false, true, false, false]);
+        for (step, says) in found.steps.iter().zip(["no masses", "", "exact", "noise of the sensor"]) {
+            assert!(step.reason.contains(says), "{}", step.reason);
+            assert!((step.physics_rms_m - step.analytic_rms_m).abs() < 1e-6, "{step:?}");
+        }
+        assert!(found.sentence.contains("Not simulated: joint_compliance 2"), "{}", found.sentence);
+    }
+
+    /// Of the kinds that move the arm none is forgotten.
+    #[test]
+    fn kinds_are_those_that_can_be_switched_on() {
+        let (scene, rows) = readings(Vec::new(), 30);
+        let rows: Vec<&Measurement> = rows.iter().collect();
+        let waterfall = Waterfall::new(&scene.arm, &scene.sensor, &rows).unwrap();
+        let parameters = Parameters {
+            sign: Some(-1.0),
+            phase_rad: Some(0.1),
+            order: Some(2.0),
+            source: Some(2),
+            translation_m: Some([1e-5, 0.0, 0.0]),
+            rotation_rad: Some([0.0; 3]),
+            after: Some(0.5),
+            row: Some(15),
+            factor: None,
+        };
+        for kind in Kind::ALL {
+            let effect = named(kind, Some(2), 1e-4, parameters.clone());
+            let found = scene_effect(&effect, &waterfall.rows);
+            assert_eq!(found.is_err(), kind.level() == Level::Sensor, "{kind:?}");
+            if let Ok(found) = found {
+                assert_eq!(found.kinds(), [kind]);
+                assert!(Sort::from_name(found.name()).is_some());
+            }
+        }
+    }
 }

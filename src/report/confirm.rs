@@ -1,7 +1,7 @@
 //! What the physics says of a diagnosis, for people: the same waterfall from formulas and from the simulated arm.
 
 use super::diagnosis::place;
-use super::{number, table};
+use super::{micrometres as um, number, table};
 use crate::experiments::confirm::{Answer, Confirmation};
 
 /// The part of the report that comes under the diagnosis.
@@ -11,21 +11,11 @@ pub fn text(confirmation: &Confirmation) -> String {
     if matches!(confirmation.verdict, Answer::NothingToConfirm) {
         return text;
     }
-    let um = |metres: f64| number(metres * 1e6);
     let some = |metres: Option<f64>| metres.map_or_else(|| "–".to_owned(), um);
     let none = || "–".to_owned();
     let geometry = um(confirmation.geometry_rms_m);
-    let mut rows = vec![vec![
-        "geometry".to_owned(),
-        none(),
-        geometry.clone(),
-        geometry,
-        none(),
-        none(),
-        none(),
-        none(),
-        String::new(),
-    ]];
+    let mut rows =
+        vec![vec!["geometry".to_owned(), none(), geometry.clone(), geometry, none(), none(), none(), none(), String::new()]];
     for step in &confirmation.steps {
         let word = match (step.simulated, step.disagreement.is_empty()) {
             (false, _) => "not simulated",
@@ -40,28 +30,18 @@ pub fn text(confirmation: &Confirmation) -> String {
             some(step.displacement_rms_m),
             some(step.difference_rms_m),
             some(step.difference_max_m),
-            step.difference_share.map_or_else(none, |share| format!("{} %", number(100.0 * share))),
+            step.difference_share.map_or_else(none, |share| format!("{:.1} %", 100.0 * share)),
             word.to_owned(),
         ]);
     }
     let noise = um(confirmation.noise_rms_m);
-    rows.push(vec![
-        "noise floor".to_owned(),
-        noise.clone(),
-        noise.clone(),
-        noise,
-        none(),
-        none(),
-        none(),
-        none(),
-        String::new(),
-    ]);
+    rows.push(vec!["noise floor".to_owned(), noise.clone(), noise.clone(), noise, none(), none(), none(), none(), String::new()]);
     let header =
         ["held-out RMS, µm", "diagnosis", "formulas", "physics", "moved by, RMS", "formula off, RMS", "largest", "share", ""];
     text.push_str(&table(&header, rows));
     text.push_str(&format!(
         "\nSimulated at rest to {} µm{}{}.\n",
-        number(confirmation.settling_error_m * 1e6),
+        um(confirmation.settling_error_m),
         if confirmation.unsettled > 0 { format!("; {} readings did not settle", confirmation.unsettled) } else { String::new() },
         if confirmation.undecided > 0 {
             format!("; in {} readings friction holds play that the formula seats", confirmation.undecided)
