@@ -73,8 +73,9 @@ pub(crate) enum Command {
         kincal diagnose recordings/arm8-measure.mcap --confirm       what is named, again from the physics\n\n\
         Besides the columns of `kincal identify` a table may have approach1… (-1, 0, 1), temp_ambient_c, payload_kg, dwell_s,\n\
         session and target. What is missing switches off what needs it. Exit code 1: there is a gap that is not explained, or\n\
-        --confirm finds that the physics disagrees: it moves the target otherwise than the formulas, by more than 5 % and more than\n\
-        a fifth of the noise floor (RMS), or leaves held-out errors that are larger or smaller by more than half of it.")]
+        --confirm finds that the physics disagrees: it moves the target otherwise than the formulas of first order (by more than 5 %\n\
+        and more than a fifth of the noise floor), its held-out RMS differs from theirs by more than that, or stays above the\n\
+        diagnosis' own by more than half of it.")]
     Diagnose(DiagnoseOptions),
     /// Recompute a recording and compare bit for bit
     #[command(after_help = "Examples:\n  kincal replay recordings/arm8.mcap\n  \

@@ -1,7 +1,7 @@
 //! What the physics says of a diagnosis, for people: the same waterfall from formulas and from the simulated arm.
 
 use super::diagnosis::place;
-use super::{micrometres as um, number, table};
+use super::{micrometres as um, table};
 use crate::experiments::confirm::{Answer, Confirmation};
 
 /// The part of the report that comes under the diagnosis.
@@ -44,7 +44,7 @@ pub fn text(confirmation: &Confirmation) -> String {
         um(confirmation.settling_error_m),
         if confirmation.unsettled > 0 { format!("; {} readings did not settle", confirmation.unsettled) } else { String::new() },
         if confirmation.undecided > 0 {
-            format!("; in {} readings friction holds play that the formula seats", confirmation.undecided)
+            format!("; in {} readings friction holds play that the formulas seat", confirmation.undecided)
         } else {
             String::new()
         },
