@@ -16,7 +16,7 @@ pub mod power;
 pub mod rows;
 pub mod search;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod verdict;
 pub mod waterfall;
 

@@ -25,7 +25,8 @@ use crate::scene::effect::{Effect, Moves};
 
 /// Displacements agree where they differ by less than this share of the effect's,
 pub const SHARE_OF_DISPLACEMENT: f64 = 0.05;
-/// or by less than this share of the noise floor (both 3-D RMS). Held-out RMS agree where they differ by less than that.
+/// or by less than this share of the noise floor (both 3-D RMS; where less than the floor is left at last, of that). Held-out RMS agree
+/// where they differ by less than that.
 pub const SHARE_OF_NOISE: f64 = 0.2;
 /// Held-out RMS by the physics may be larger than the diagnosis' own by so much of the noise floor: each fold has magnitudes of its own
 /// there.
@@ -144,6 +145,8 @@ pub fn confirm(
     let everything = formulas.iter().flatten().fold(nothing.clone(), |sum, one| added(&sum, one));
     waterfall.weigh(&everything)?;
     confirmation.geometry_rms_m = waterfall.after(&nothing)?;
+    // Repeats on both sides of a step make the noise floor larger than all that is left.
+    let noise_rms_m = noise_rms_m.min(waterfall.after(&everything)?);
 
     let still = simulator.run(&[])?;
     // What is simulated so far, with what it does; what is not, by its formula.
@@ -257,8 +260,8 @@ fn answer(steps: &[Step]) -> (Answer, String) {
     }
     let worst = steps.iter().filter_map(|step| step.difference_rms_m).fold(0.0, f64::max);
     let sentence = format!(
-        "The physics confirms it: held-out RMS {} µm with what it does taken away, {} µm with the formulas, which are {} µm RMS off at \
-         most.{besides}",
+        "The physics confirms it: held-out RMS is {} µm with what the physics does taken away, {} µm with the formulas of first order; \
+         both move the target alike to {} µm RMS.{besides}",
         um(last.physics_rms_m),
         um(last.analytic_rms_m),
         um(worst)
@@ -680,6 +683,27 @@ mod tests {
         // What no arm has is refused by the physics, in its words.
         let negative = of(named(Kind::JointCompliance, Some(2), -1e-5, Parameters::default()));
         assert!(negative.steps[0].reason.contains("stiffness"), "{}", negative.steps[0].reason);
+    }
+
+    #[test]
+    fn a_confirmation_is_as_the_schema_has_it() {
+        let (scene, rows) = readings(Vec::new(), 30);
+        let rows: Vec<&Measurement> = rows.iter().collect();
+        let effects = vec![
+            named(Kind::TiltClearance, Some(2), 2e-4, Parameters::default()),
+            named(Kind::MeasurementScale, None, 5e-5, Parameters::default()),
+        ];
+        let diagnosis = Diagnosis { effects, ..diagnosed(&scene, &rows) };
+        let schema: serde_json::Value = serde_json::from_str(outcome::SCHEMA).unwrap();
+        let mut value = serde_json::to_value(&diagnosis).unwrap();
+        let found = confirm(&diagnosis, &scene.arm, &scene.sensor, &rows).unwrap();
+        value["confirmation"] = serde_json::to_value(&found).unwrap();
+        crate::diagnosis::tests::check(&schema, &schema, &value, "").unwrap();
+        // Columns stand under each other.
+        let text = crate::report::confirm::text(&found);
+        let widths: Vec<usize> =
+            text.lines().filter(|line| line.contains("  ") && line.starts_with(' ')).map(|line| line.chars().count()).collect();
+        assert!(widths.len() == 5 && widths.iter().all(|width| *width == widths[0]), "{text}");
     }
 
     #[test]

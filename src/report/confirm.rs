@@ -7,7 +7,7 @@ use crate::experiments::confirm::{Answer, Confirmation};
 /// The part of the report that comes under the diagnosis.
 #[must_use]
 pub fn text(confirmation: &Confirmation) -> String {
-    let mut text = format!("\n{}\n", confirmation.sentence);
+    let mut text = format!("{}\n", confirmation.sentence);
     if matches!(confirmation.verdict, Answer::NothingToConfirm) {
         return text;
     }
@@ -36,8 +36,17 @@ pub fn text(confirmation: &Confirmation) -> String {
     }
     let noise = um(confirmation.noise_rms_m);
     rows.push(vec!["noise floor".to_owned(), noise.clone(), noise.clone(), noise, none(), none(), none(), none(), String::new()]);
-    let header =
-        ["held-out RMS, µm", "diagnosis", "formulas", "physics", "moved by, RMS", "formula off, RMS", "largest", "share", ""];
+    let header = [
+        "held out, RMS",
+        "diagnosis, µm",
+        "formulas, µm",
+        "physics, µm",
+        "moved by, µm RMS",
+        "formula off, µm RMS",
+        "at most, µm",
+        "of it",
+        "",
+    ];
     text.push_str(&table(&header, rows));
     text.push_str(&format!(
         "\nSimulated at rest to {} µm{}{}.\n",
