@@ -231,7 +231,12 @@ fn disagreement(step: &Step, noise_rms_m: f64, held: usize) -> String {
     }
     let (analytic, physics) = (step.analytic_rms_m, step.physics_rms_m);
     if (physics - analytic).abs() > SHARE_OF_NOISE * noise_rms_m {
-        said.push(format!("held-out RMS is {} µm by the physics, {} µm by the formulas", um(physics), um(analytic)));
+        let nearer = if physics < analytic { "physics" } else { "formulas" };
+        said.push(format!(
+            "held-out RMS is {} µm by the physics, {} µm by the formulas (the readings side with the {nearer})",
+            um(physics),
+            um(analytic)
+        ));
     }
     if held > 0 && !said.is_empty() {
         said.push(format!("in {held} readings the load is too small to seat the play, friction holds it in its middle"));
