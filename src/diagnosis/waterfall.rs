@@ -1,77 +1,85 @@
 //! What named effects are worth on held-out poses, once what they do to each reading is known: by the formulas of first order
 //! ([`Waterfall::displacements`]), or told by somebody else, such as a simulation.
 
-use nalgebra::Vector3;
-
-use super::conditions::{Conditions, conditions};
+use super::conditions::{self, Conditions};
+use super::groups::{self, groups};
+use super::held_out::{self, Scheme};
 use super::outcome::Effect;
-use super::rows::{self, DiagnosisError, Rows};
-use super::{FOLDS, held_out, outliers};
+use super::outliers;
+use super::rows::{self, DiagnosisError, Readings, Rows};
 use crate::arm::Arm;
 use crate::effects::Kind;
 use crate::effects::signature::shape::{Displacement, Shape};
-use crate::frames::rotation_from_vector;
 use crate::measurement::{Measurement, Sensor};
 
-/// Rounds of weighting outliers down.
+/// Rounds of fitting geometry beside the effects, and of weighting readings.
 const PASSES: usize = 4;
 
-/// Readings with the folds of their diagnosis, and the weights of those that are far off: the same for every step of a waterfall.
+/// Readings with the folds of their diagnosis and the weights that they have beside the effects named: the same for every step of a
+/// waterfall.
 #[derive(Clone, Debug)]
 pub struct Waterfall<'a> {
     arm: &'a Arm,
     sensor: &'a Sensor,
     measurements: &'a [&'a Measurement],
-    /// Geometry fitted to the readings as they are.
+    /// Geometry fitted beside the effects.
     pub rows: Rows,
     /// Readings as signatures see them.
     pub conditions: Conditions,
-    fold: Vec<usize>,
+    scheme: Scheme,
     weights: Vec<f64>,
     good: Vec<bool>,
 }
 
 impl<'a> Waterfall<'a> {
-    /// Of `measurements` of `arm`, read by `sensor`.
+    /// Of `measurements` of `arm`, read by `sensor`, in which `effects` were found. Readings that are far off beside them are weighted
+    /// down and do not count where they are held out, and those that repeat others count as much as they tell, as in a diagnosis.
     ///
     /// # Errors
     /// If the measurements cannot tell where the arm stands, or are not this robot's.
-    pub fn new(arm: &'a Arm, sensor: &'a Sensor, measurements: &'a [&'a Measurement]) -> Result<Self, DiagnosisError> {
+    pub fn new(
+        arm: &'a Arm,
+        sensor: &'a Sensor,
+        measurements: &'a [&'a Measurement],
+        effects: &[Effect],
+    ) -> Result<Self, DiagnosisError> {
         let total = measurements.len();
-        let rows = rows::fit(arm, sensor, measurements, &vec![1.0; total])?;
-        let conditions = conditions(measurements, &rows);
-        let fold = held_out::regions(&rows.targets, FOLDS.min(total / 4).max(2));
-        Ok(Waterfall { arm, sensor, measurements, rows, conditions, fold, weights: vec![1.0; total], good: vec![true; total] })
+        let groups = groups(measurements);
+        let start = vec![1.0; total];
+        let rows = rows::fit(arm, Readings { sensor, measurements, weights: &start, displacement: &[] })?;
+        let conditions = conditions::conditions(measurements, &rows);
+        let scheme = held_out::schemes(measurements, &rows.targets, &groups).swap_remove(0);
+        let good = vec![true; total];
+        let mut waterfall = Waterfall { arm, sensor, measurements, rows, conditions, scheme, weights: start, good };
+        for _ in 0..PASSES {
+            let displacement = waterfall.all(effects);
+            let weights = &waterfall.weights;
+            let rows = rows::fit(arm, Readings { sensor, measurements, weights, displacement: &displacement })?;
+            // In declared sigmas, whatever a row's weight.
+            let sigmas: Vec<f64> = (0..rows.residual.len())
+                .map(|equation| rows.residual[equation] * rows.whitening[equation] / libm::sqrt(weights[equation / rows.per_row]))
+                .collect();
+            let squares: Vec<f64> =
+                sigmas.chunks(rows.per_row).map(|row| row.iter().map(|value| value * value).sum::<f64>()).collect();
+            let far = outliers::weights(&squares, rows.per_row);
+            let near: Vec<bool> = far.iter().map(|weight| *weight > 0.5).collect();
+            let (dependent, _) = groups::weights(&groups, &sigmas, rows.per_row, &near);
+            let outliers = outliers::look(&squares, rows.per_row).rows;
+            waterfall.good = (0..total).map(|row| !outliers.contains(&row)).collect();
+            waterfall.weights = far.iter().zip(&dependent).map(|(a, b)| a * b).collect();
+            waterfall.conditions = conditions::conditions(measurements, &rows);
+            waterfall.rows = rows;
+        }
+        Ok(waterfall)
     }
 
-    /// Readings that are far off although `displacements` (as in [`Waterfall::after`]) are taken away are weighted down from now on,
-    /// and do not count where they are held out, as in a diagnosis.
-    ///
-    /// # Errors
-    /// As [`Waterfall::after`].
-    pub fn weigh(&mut self, displacements: &[Displacement]) -> Result<(), DiagnosisError> {
-        let changed = self.without(displacements);
-        let changed: Vec<&Measurement> = changed.iter().collect();
-        let mut squares = Vec::new();
-        for _ in 0..PASSES {
-            let fitted = rows::fit(self.arm, self.sensor, &changed, &self.weights)?;
-            squares = (0..changed.len())
-                .map(|row| {
-                    let (first, count) = (row * fitted.per_row, fitted.per_row);
-                    let whitened = fitted.residual.rows(first, count).component_mul(&fitted.whitening.rows(first, count));
-                    whitened.norm_squared() / self.weights[row]
-                })
-                .collect();
-            let next = outliers::weights(&squares, fitted.per_row);
-            let same = next.iter().zip(&self.weights).all(|(a, b)| (a - b).abs() < 1e-3);
-            self.weights = next;
-            if same {
-                break;
-            }
-        }
-        let far = outliers::look(&squares, self.rows.per_row, 1.0).rows;
-        self.good = (0..changed.len()).map(|row| !far.contains(&row)).collect();
-        Ok(())
+    /// What all of `effects` that have a formula do together.
+    fn all(&self, effects: &[Effect]) -> Vec<Displacement> {
+        let nothing = vec![[0.0; 6]; self.measurements.len()];
+        effects
+            .iter()
+            .filter_map(|effect| self.displacements(effect))
+            .fold(nothing, |sum, one| sum.iter().zip(&one).map(|(a, b)| std::array::from_fn(|axis| a[axis] + b[axis])).collect())
     }
 
     /// What `effect` does to the target in each reading (shift in m, turn in rad, in root), to first order; `None` where there is no
@@ -103,40 +111,23 @@ impl<'a> Waterfall<'a> {
     /// If what remains is not this robot's.
     pub fn after(&self, displacements: &[Displacement]) -> Result<f64, DiagnosisError> {
         use rayon::prelude::*;
-        let changed = self.without(displacements);
-        let changed: Vec<&Measurement> = changed.iter().collect();
-        let folds = self.fold.iter().max().map_or(1, |most| most + 1);
-        let squares: Vec<(f64, usize)> = (0..folds)
+        let (sensor, measurements) = (self.sensor, self.measurements);
+        let squares: Vec<(f64, usize)> = (0..self.scheme.folds)
             .into_par_iter()
             .map(|number| {
-                let held = |row: &usize| self.fold[*row] == number;
+                let held = |row: &usize| self.scheme.fold[*row] == number;
                 // What weighs nothing has no part in the fit, and its residual is the prediction's error.
-                let weights: Vec<f64> = (0..changed.len()).map(|row| if held(&row) { 0.0 } else { self.weights[row] }).collect();
-                let fitted = rows::fit(self.arm, self.sensor, &changed, &weights)?;
-                let counted: Vec<usize> = (0..changed.len()).filter(|row| held(row) && self.good[*row]).collect();
+                let weights: Vec<f64> =
+                    (0..measurements.len()).map(|row| if held(&row) { 0.0 } else { self.weights[row] }).collect();
+                let fitted =
+                    rows::fit(self.arm, Readings { sensor, measurements, weights: &weights, displacement: displacements })?;
+                let counted: Vec<usize> = (0..measurements.len()).filter(|row| held(row) && self.good[*row]).collect();
                 let square = |row: &usize| fitted.residual.fixed_rows::<3>(row * fitted.per_row).norm_squared();
                 Ok((counted.iter().map(square).sum::<f64>(), counted.len()))
             })
             .collect::<Result<_, DiagnosisError>>()?;
         let (sum, count) = squares.iter().fold((0.0, 0), |(sum, count), one| (sum + one.0, count + one.1));
         Ok(libm::sqrt(sum / count.max(1) as f64))
-    }
-
-    /// The readings as they would be without `displacements`.
-    fn without(&self, displacements: &[Displacement]) -> Vec<Measurement> {
-        let measurement_from_root = self.rows.measurement_from_root.rotation;
-        let changed = |(measurement, displacement): (&&Measurement, &Displacement)| {
-            let [x, y, z, turn @ ..] = *displacement;
-            let mut changed = (*measurement).clone();
-            changed.position_m = (measurement.position() - measurement_from_root * Vector3::new(x, y, z)).coords.into();
-            if let Some(attitude) = measurement.attitude() {
-                let back = rotation_from_vector(&(measurement_from_root * -Vector3::from(turn)));
-                let q = *(back * attitude).quaternion();
-                changed.attitude_xyzw = Some([q.i, q.j, q.k, q.w]);
-            }
-            changed
-        };
-        self.measurements.iter().zip(displacements).map(changed).collect()
     }
 }
 

@@ -136,14 +136,13 @@ pub fn confirm(
     if diagnosis.effects.is_empty() {
         return Ok(confirmation);
     }
-    let mut waterfall = Waterfall::new(arm, sensor, measurements)?;
+    let waterfall = Waterfall::new(arm, sensor, measurements, &diagnosis.effects)?;
     let simulator = Simulator::new(arm, &waterfall, measurements);
     let nothing = vec![[0.0; 6]; measurements.len()];
 
     let formulas: Vec<Option<Vec<Displacement>>> =
         diagnosis.effects.iter().map(|effect| waterfall.displacements(effect)).collect();
     let everything = formulas.iter().flatten().fold(nothing.clone(), |sum, one| added(&sum, one));
-    waterfall.weigh(&everything)?;
     confirmation.geometry_rms_m = waterfall.after(&nothing)?;
     // Repeats on both sides of a step make the noise floor larger than all that is left.
     let noise_rms_m = noise_rms_m.min(waterfall.after(&everything)?);
@@ -607,7 +606,7 @@ mod tests {
     fn without_effects_the_simulated_arm_is_the_fitted_one() {
         let (scene, rows) = readings(Vec::new(), 40);
         let rows: Vec<&Measurement> = rows.iter().collect();
-        let waterfall = Waterfall::new(&scene.arm, &scene.sensor, &rows).unwrap();
+        let waterfall = Waterfall::new(&scene.arm, &scene.sensor, &rows, &[]).unwrap();
         let simulator = Simulator::new(&scene.arm, &waterfall, &rows);
         let ran = simulator.run(&[]).unwrap();
         for ((pose, in_tool), target) in ran.poses.iter().zip(&simulator.targets).zip(&waterfall.rows.targets) {
@@ -654,7 +653,7 @@ mod tests {
         let (scene, rows) = readings(Vec::new(), 40);
         let rows: Vec<&Measurement> = rows.iter().collect();
         let effect = named(Kind::TiltClearance, Some(2), 2e-4, Parameters::default());
-        let waterfall = Waterfall::new(&scene.arm, &scene.sensor, &rows).unwrap();
+        let waterfall = Waterfall::new(&scene.arm, &scene.sensor, &rows, &[]).unwrap();
         let simulator = Simulator::new(&scene.arm, &waterfall, &rows);
         let ran = simulator.run(&[scene_effect(&effect, &waterfall.rows).unwrap()]).unwrap();
         let moved = simulator.displacements(&ran.poses, &simulator.run(&[]).unwrap().poses);
@@ -739,7 +738,7 @@ mod tests {
     fn kinds_are_those_that_can_be_switched_on() {
         let (scene, rows) = readings(Vec::new(), 30);
         let rows: Vec<&Measurement> = rows.iter().collect();
-        let waterfall = Waterfall::new(&scene.arm, &scene.sensor, &rows).unwrap();
+        let waterfall = Waterfall::new(&scene.arm, &scene.sensor, &rows, &[]).unwrap();
         let parameters = Parameters {
             sign: Some(-1.0),
             phase_rad: Some(0.1),
