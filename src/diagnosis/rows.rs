@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Translation3, UnitQuaternio
 use crate::arm::Arm;
 use crate::effects::signature::posture::{Mechanism, Posture};
 use crate::effects::signature::shape::Displacement;
-use crate::frames::{Pose, rotation_from_vector, rotation_vector};
+use crate::frames::{Pose, registration, rotation_from_vector, rotation_vector};
 use crate::measurement::{Measurement, Sensor};
 
 /// One sigma of a joint frame's position, m: machining and assembly are better than this.
@@ -374,24 +374,4 @@ pub(super) fn scaled(matrix: &DMatrix<f64>, weights: &DVector<f64>) -> DMatrix<f
         column.component_mul_assign(weights);
     }
     result
-}
-
-/// The pose that brings `from` nearest to `to` (Kabsch 1976); `None` where the points lie on a line.
-fn registration(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Pose> {
-    let count = from.len() as f64;
-    let (from_centre, to_centre) = (from.iter().sum::<Vector3<f64>>() / count, to.iter().sum::<Vector3<f64>>() / count);
-    let covariance: Matrix3<f64> =
-        from.iter().zip(to).map(|(from, to)| (to - to_centre) * (from - from_centre).transpose()).sum();
-    let svd = covariance.svd(true, true);
-    let (u, v_t) = (svd.u?, svd.v_t?);
-    let mut values: Vec<f64> = svd.singular_values.iter().copied().collect();
-    values.sort_by(|a, b| b.total_cmp(a));
-    if values[1] <= values[0] * 1e-9 || !values[0].is_finite() || values[0] < 1e-12 {
-        return None;
-    }
-    let mut signs = Matrix3::identity();
-    let smallest = svd.singular_values.imin();
-    signs[(smallest, smallest)] = (u * v_t).determinant().signum();
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(u * signs * v_t));
-    Some(Pose::from_parts(Translation3::from(to_centre - rotation * from_centre), rotation))
 }

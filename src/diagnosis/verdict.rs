@@ -54,9 +54,10 @@ fn probability(analysis: &Analysis<'_>, test: impl Fn(usize) -> bool) -> f64 {
     analysis.found.models.iter().filter(|(members, _)| holds(members)).map(|(_, weight)| weight).sum::<f64>().min(1.0)
 }
 
-/// What parts of the data choose in the place of a claim of the best set: the folds that lack it and hold a claim that the best set has
-/// not, with that claim's share of all folds. A posterior given all data is too sure of the least wrong of wrong models; where parts
-/// of the data contradict it, the parts are believed (Huggins and Miller 2023, "Reproducible model selection using bagged posteriors").
+/// What parts of the data prefer to a claim of the best set: the folds whose best set lacks it and holds a claim that the best set of all
+/// data has not, each with by how much it prefers that one (difference of probabilities), as a share of all folds. A posterior given
+/// all data is too sure of the least wrong of wrong models; where parts of the data contradict it, the parts are believed (Huggins and
+/// Miller 2023, "Reproducible model selection using bagged posteriors").
 fn rivals(analysis: &Analysis<'_>, this: Claim) -> Vec<(Claim, usize, f64)> {
     let best: Vec<Claim> = analysis.found.best.members.iter().map(|(member, _)| claim(analysis, *member)).collect();
     let folds = analysis.held_out.first().map_or(&[][..], |by_region| &by_region.folds);
@@ -65,8 +66,12 @@ fn rivals(analysis: &Analysis<'_>, this: Claim) -> Vec<(Claim, usize, f64)> {
         let Some(other) = fold.chosen.iter().copied().find(|other| !best.contains(&claim(analysis, *other))) else {
             continue;
         };
-        let share = 1.0 / folds.len() as f64;
+        let of = |one: Claim| -> f64 {
+            let holds = |members: &[(usize, usize)]| members.iter().any(|(member, _)| claim(analysis, *member) == one);
+            fold.models.iter().filter(|(members, _)| holds(members)).map(|(_, weight)| weight).sum()
+        };
         let rival = claim(analysis, other);
+        let share = (of(rival) - of(this)).max(0.0) / folds.len() as f64;
         match found.iter_mut().find(|(known, _, _)| *known == rival) {
             Some((_, _, sum)) => *sum += share,
             None => found.push((rival, other, share)),
