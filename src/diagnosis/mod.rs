@@ -9,6 +9,7 @@ pub mod evidence;
 pub mod gram;
 pub mod groups;
 pub mod held_out;
+pub mod mistake;
 pub mod open_set;
 pub mod outcome;
 pub mod outliers;
