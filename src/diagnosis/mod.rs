@@ -188,6 +188,44 @@ pub fn diagnose(
     Err(DiagnosisError::Degenerate)
 }
 
+/// A data set around its calibrated geometry, ready for the evidence of single effects.
+pub struct Singles {
+    problem: Problem,
+    whole: held_out::Scheme,
+    candidates: Candidates,
+    noise: NoisePrior,
+}
+
+impl Singles {
+    /// Prepares `measurements` as [`diagnose`] does in its first pass.
+    ///
+    /// # Errors
+    /// As [`diagnose`].
+    pub fn new(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], options: &Options) -> Result<Singles, DiagnosisError> {
+        let weights = vec![1.0; measurements.len()];
+        let rows = rows::fit(arm, Readings { sensor, measurements, weights: &weights, displacement: &[] })?;
+        let conditions = conditions::conditions(measurements, &rows);
+        let hypotheses = library(&rows.mechanism, &conditions.columns);
+        let (raw, candidates) = matrix(&rows, &conditions, hypotheses);
+        let groups = groups::groups(measurements);
+        let noise = noise_prior(groups::repeats(measurements, &groups), mean_sigma(sensor, measurements), options.noise);
+        let whole = held_out::Scheme { by: Block::Region, fold: vec![0; measurements.len()], folds: 1 };
+        Ok(Singles { problem: Problem::new(&rows, raw), whole, candidates, noise })
+    }
+
+    /// The evidence of every hypothesis alone, at every scale of its prior: inner products, geometry taken out, marginal likelihoods.
+    #[must_use]
+    pub fn evidence(&self) -> Vec<evidence::Model> {
+        let gram = held_out::sum(&self.problem.grams(&self.whole));
+        let Some(surviving) = gram.surviving(&self.problem.offset) else {
+            return Vec::new();
+        };
+        let mut candidates = self.candidates.clone();
+        weigh(&mut candidates, &surviving);
+        evidence::extensions(&surviving, &candidates, self.noise, &[])
+    }
+}
+
 /// What is known of the noise: from repeats where there are any, else what is said.
 fn noise_prior(repeats: Option<Repeats>, declared_m: f64, source: NoiseSource) -> NoisePrior {
     match (repeats, source) {
