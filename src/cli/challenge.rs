@@ -49,6 +49,7 @@ pub(crate) fn command(global: &Global, command: &ChallengeCommand) -> anyhow::Re
     match command {
         ChallengeCommand::New(options) => new(global, options),
         ChallengeCommand::Score(options) => scored(global, options),
+        ChallengeCommand::Power(options) => super::power::command(global, options),
     }
 }
 

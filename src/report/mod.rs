@@ -4,6 +4,7 @@ pub mod challenge;
 pub mod diagnosis;
 pub mod effects;
 pub mod findings;
+pub mod power;
 pub mod sweep;
 
 mod advice;

@@ -22,7 +22,7 @@ use crate::seed::{Stream, hidden_key, hidden_stream};
 use crate::session::{SessionError, start_event};
 
 /// Half width of the errors of length parameters, m, and of angle parameters, rad.
-const PARAMETER_ERRORS: [f64; 2] = [1e-3, 0.2 * std::f64::consts::PI / 180.0];
+pub(super) const PARAMETER_ERRORS: [f64; 2] = [1e-3, 0.2 * std::f64::consts::PI / 180.0];
 /// Heavy tails: so many of the readings have a noise so many times the declared one.
 const TAILS: Tails = Tails { share: 0.05, factor: 5.0 };
 /// Noise that is larger than declared is so many times as large.
