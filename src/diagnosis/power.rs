@@ -10,7 +10,7 @@ use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 
 use super::evidence::{Candidates, NoisePrior, SCALES, one_signed};
 use super::gram::Surviving;
-use crate::seed::{Stream, stream};
+use crate::seed::stream;
 
 /// Share of cases in which the least magnitude is named.
 const POWER: f64 = 0.8;
@@ -50,8 +50,22 @@ pub struct Bench<'a> {
     noise: f64,
     /// Of every hypothesis, the inverse of its inner products.
     inverses: Vec<DMatrix<f64>>,
-    /// Standard normal quantiles in the middle of as many equal shares.
-    quantiles: Vec<f64>,
+    /// Draws of standard normals that all claims share, so that one can be compared with another.
+    pool: Vec<Pool>,
+}
+
+/// What is drawn at once.
+struct Pool {
+    /// Along the signal; these are quantiles, each once.
+    along: f64,
+    /// Of the columns.
+    columns: [f64; COLUMNS],
+    /// Of all other equations together.
+    rest: f64,
+    /// Where the effect points.
+    direction: [f64; 6],
+    /// Share of a turn beside a translation.
+    turn: f64,
 }
 
 /// Something that is looked at.
@@ -98,8 +112,20 @@ impl<'a> Bench<'a> {
                 firm(block).map_or_else(|| DMatrix::zeros(columns.len(), columns.len()), |cholesky| cholesky.inverse())
             })
             .collect();
-        let quantiles = (0..DRAWS).map(|draw| normal_quantile((draw as f64 + 0.5) / DRAWS as f64)).collect();
-        Bench { candidates, surviving, prior, noise: noise.max(1e-12), inverses, quantiles }
+        let mut stream = stream(0, "power");
+        let mut quantiles: Vec<f64> = (0..DRAWS).map(|draw| normal_quantile((draw as f64 + 0.5) / DRAWS as f64)).collect();
+        stream.shuffle(&mut quantiles);
+        let pool = quantiles
+            .into_iter()
+            .map(|along| Pool {
+                along,
+                columns: std::array::from_fn(|_| stream.normal()),
+                rest: stream.normal(),
+                direction: std::array::from_fn(|_| stream.normal()),
+                turn: stream.uniform(0.2, 1.0),
+            })
+            .collect();
+        Bench { candidates, surviving, prior, noise: noise.max(1e-12), inverses, pool }
     }
 
     fn information(&self, hypothesis: usize) -> f64 {
@@ -154,26 +180,37 @@ impl<'a> Bench<'a> {
     /// The least magnitude that is named often enough in `worlds`.
     fn least(&self, worlds: &[World]) -> Option<f64> {
         let draws: usize = worlds.iter().map(|world| world.draws.len()).sum();
-        let enough = |size: f64| {
-            let named: usize = worlds.iter().map(|world| world.named(size)).sum();
-            named as f64 >= POWER * draws as f64
+        // What is named at a smaller magnitude and at a larger one is named between; what is at neither is not.
+        let named = |size: f64, low: &[bool], high: &[bool]| -> Vec<bool> {
+            let all = worlds.iter().flat_map(|world| (0..world.draws.len()).map(move |draw| (world, draw)));
+            let known = low.iter().zip(high);
+            all.zip(known)
+                .map(|((world, draw), (low, high))| if low == high { *low } else { world.is_named(draw, size) })
+                .collect()
         };
+        let enough = |named: &[bool]| named.iter().filter(|named| **named).count() as f64 >= POWER * draws as f64;
+        let (never, always) = (vec![false; draws], vec![true; draws]);
         let mean = worlds.iter().flat_map(|world| &world.draws).map(|draw| draw.signal).sum::<f64>() / draws.max(1) as f64;
         if draws == 0 || mean <= 0.0 {
             return None;
         }
         // λ of about 25 is usual.
         let (mut low, mut high) = (libm::sqrt(12.0 * self.noise / mean), libm::sqrt(40.0 * self.noise / mean));
+        let (mut below, mut above) = (named(low, &never, &always), named(high, &never, &always));
         let mut tries = 0;
-        while !enough(high) {
-            (low, high) = (high, 2.0 * high);
+        while !enough(&above) {
+            (low, below) = (high, above);
+            high *= 2.0;
+            above = named(high, &never, &always);
             tries += 1;
             if tries > 14 {
                 return None;
             }
         }
-        while enough(low) {
-            (low, high) = (0.5 * low, low);
+        while enough(&below) {
+            (high, above) = (low, below);
+            low *= 0.5;
+            below = named(low, &never, &always);
             tries += 1;
             if tries > 20 {
                 return Some(high);
@@ -181,10 +218,11 @@ impl<'a> Bench<'a> {
         }
         while high / low > 1.01 {
             let middle = libm::sqrt(low * high);
-            if enough(middle) {
-                high = middle;
+            let between = named(middle, &below, &above);
+            if enough(&between) {
+                (high, above) = (middle, between);
             } else {
-                low = middle;
+                (low, below) = (middle, between);
             }
         }
         Some(libm::sqrt(low * high))
@@ -279,31 +317,35 @@ impl<'a> Bench<'a> {
         let width = world.members[0].columns.len();
         let truth = &self.candidates.hypotheses[world.members[0].hypothesis];
         let unit = self.candidates.unit[world.members[0].hypothesis];
-        let mut stream = stream(number as u64, "power");
         let sigma = libm::sqrt(self.noise);
-        let mut quantiles: Vec<f64> = self.quantiles.iter().skip(number).step_by(count).copied().collect();
-        stream.shuffle(&mut quantiles);
+        // Row by row.
+        let rows: Vec<f64> = (0..size).flat_map(|i| (0..=i).map(move |j| factor[(i, j)])).collect();
+        let shown: Vec<f64> = (0..size).flat_map(|i| (0..width).map(move |j| products[(i, j)])).collect();
         let (mut direction, mut own, mut normal) = (vec![0.0; width], vec![0.0; width], vec![0.0; size]);
-        for quantile in quantiles {
-            towards(&mut direction, world.members[0].signed, &mut stream);
+        for pool in self.pool.iter().skip(number).step_by(count) {
+            towards(&mut direction, world.members[0].signed, pool);
             // Along the principal axes of the truth.
             for (i, own) in own.iter_mut().enumerate() {
                 *own = (0..width).map(|j| axes[(j, i)] * direction[j] / (unit * truth.spread[j])).sum();
             }
             let signal: f64 = (0..width).map(|i| own[i] * own[i] * products[(i, i)]).sum();
-            normal.iter_mut().for_each(|value| *value = stream.normal());
+            normal.copy_from_slice(&pool.columns[..size]);
             // What decides is the noise along the signal: there its quantiles are met one by one.
             let length = libm::sqrt(signal.max(1e-300));
             let along: f64 = (0..width).map(|i| normal[i] * own[i] * factor[(i, i)]).sum::<f64>() / length;
             for i in 0..width {
-                normal[i] += (quantile - along) * own[i] * factor[(i, i)] / length;
+                normal[i] += (pool.along - along) * own[i] * factor[(i, i)] / length;
             }
             let mut squares: f64 = normal.iter().map(|value| value * value).sum();
-            squares += chi_square(self.surviving.freedom - size as f64, stream.normal());
+            squares += chi_square(self.surviving.freedom - size as f64, pool.rest);
             let mut cross = 0.0;
+            let mut first = 0;
             for i in 0..size {
-                let noise = sigma * (0..=i).map(|j| factor[(i, j)] * normal[j]).sum::<f64>();
-                world.signal.push((0..width).map(|j| products[(i, j)] * own[j]).sum());
+                let row = &rows[first..=first + i];
+                first += i + 1;
+                let noise = sigma * row.iter().zip(&normal).map(|(factor, normal)| factor * normal).sum::<f64>();
+                let shown = &shown[i * width..(i + 1) * width];
+                world.signal.push(shown.iter().zip(&own).map(|(product, own)| product * own).sum());
                 world.noise.push(noise);
                 if i < width {
                     cross += 2.0 * own[i] * noise;
@@ -315,23 +357,20 @@ impl<'a> Bench<'a> {
 }
 
 /// A direction in which a unit magnitude may point, as effects have it: a sign; a phase; a translation; a translation with a turn.
-fn towards(direction: &mut [f64], signed: bool, stream: &mut Stream) {
+fn towards(direction: &mut [f64], signed: bool, pool: &Pool) {
     let width = direction.len();
     if width == 1 {
-        direction[0] = if signed || stream.unit() < 0.5 { 1.0 } else { -1.0 };
+        direction[0] = if signed || pool.direction[0] > 0.0 { 1.0 } else { -1.0 };
         return;
     }
-    let mut unit = |part: &mut [f64], length: f64| {
-        part.iter_mut().for_each(|value| *value = stream.normal());
+    direction.copy_from_slice(&pool.direction[..width]);
+    let scaled = |part: &mut [f64], length: f64| {
         let norm = libm::sqrt(part.iter().map(|value| value * value).sum::<f64>()).max(1e-12);
         part.iter_mut().for_each(|value| *value *= length / norm);
-        stream.unit()
     };
     let (translation, rotation) = direction.split_at_mut(if width == 6 { 3 } else { width });
-    let share = unit(translation, 1.0);
-    if !rotation.is_empty() {
-        unit(rotation, 0.2 + 0.8 * share);
-    }
+    scaled(translation, 1.0);
+    scaled(rotation, pool.turn);
 }
 
 /// χ² with so many degrees of freedom where a standard normal is `normal` (Wilson and Hilferty).
@@ -387,6 +426,9 @@ struct Tally {
 
 impl Tally {
     fn add(&mut self, log: f64, own: bool) {
+        if log < self.top - 1.5 * NEGLIGIBLE {
+            return;
+        }
         let weight = if log > self.top {
             let shrunk = libm::exp(self.top - log);
             self.own *= shrunk;
@@ -405,11 +447,7 @@ impl Tally {
 }
 
 impl World {
-    /// In how many draws a magnitude of `size` is named.
-    fn named(&self, size: f64) -> usize {
-        (0..self.draws.len()).filter(|draw| self.is_named(*draw, size)).count()
-    }
-
+    /// Whether a magnitude of `size` is named in a draw.
     fn is_named(&self, draw: usize, size: f64) -> bool {
         let columns = self.inverse.len();
         let signal = &self.signal[draw * columns..(draw + 1) * columns];
