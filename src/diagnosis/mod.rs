@@ -21,9 +21,9 @@ mod verdict;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::Arm;
-use crate::effects::Kind;
 use crate::effects::signature::library::{Hypothesis, library};
 use crate::effects::signature::shape::Shape;
+use crate::effects::{Kind, Location};
 use crate::measurement::{Measurement, Sensor};
 use conditions::Conditions;
 use evidence::{Candidates, NoisePrior};
@@ -49,6 +49,8 @@ pub struct Options {
     pub noise: NoiseSource,
     /// Kinds that are left out of the library.
     pub without: Vec<Kind>,
+    /// Nothing but these kinds at these places, for who knows what is there.
+    pub only: Option<Vec<(Kind, Location)>>,
 }
 
 /// What was found, before it is put into words.
@@ -94,6 +96,10 @@ pub fn diagnose(
     let hypotheses: Vec<Hypothesis> = library(&rows.mechanism, &conditions.columns)
         .into_iter()
         .filter(|hypothesis| hypothesis.kind.is_none_or(|kind| !options.without.contains(&kind)))
+        .filter(|hypothesis| {
+            let is = |(kind, place): &(Kind, Location)| hypothesis.kind == Some(*kind) && hypothesis.location == *place;
+            options.only.as_ref().is_none_or(|only| only.iter().any(is))
+        })
         .collect();
     let repeats = repeats(measurements);
     let noise = match (repeats, options.noise) {
