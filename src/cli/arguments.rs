@@ -197,6 +197,9 @@ pub(crate) struct PowerOptions {
     /// Cells at every magnitude
     #[arg(long, value_name = "N", default_value_t = 100)]
     pub(crate) trials: usize,
+    /// Sets without an effect, of whose stated magnitudes the median counts
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub(crate) sets: usize,
     /// Declared position noise, one sigma per axis in µm
     #[arg(long, value_name = "UM", default_value_t = 20.0, allow_negative_numbers = true)]
     pub(crate) noise: f64,

@@ -25,6 +25,7 @@ const SEED: u64 = 1;
 pub(super) fn command(global: &Global, options: &PowerOptions) -> anyhow::Result<Outcome> {
     ensure!((1..=100_000).contains(&options.trials), "--trials {}: 1 to 100000", options.trials);
     ensure!((0.1..=10_000.0).contains(&options.noise), "--noise {}: one sigma per axis in µm, 0.1 to 10000", options.noise);
+    ensure!((1..=10_000).contains(&options.sets), "--sets {}: 1 to 10000", options.sets);
     ensure!((12..=10_000).contains(&options.poses), "--poses {}: 12 to 10000", options.poses);
     let levels = &options.levels;
     ensure!(
@@ -49,6 +50,7 @@ pub(super) fn command(global: &Global, options: &PowerOptions) -> anyhow::Result
     let check = power::Options {
         what: what(&options.kinds, &base.scene.arm)?,
         trials: options.trials,
+        sets: options.sets,
         levels: sorted,
         plan: case::Options {
             cases: 1,

@@ -22,9 +22,6 @@ use crate::session::SessionError;
 const POWER: f64 = 0.8;
 /// From this probability on an effect counts as named.
 const NAMED: f64 = 0.5;
-/// Data sets without an effect from which the stated magnitude comes: each has its own noise, and its own estimate of it.
-const SETS: usize = 20;
-
 /// What is checked.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Options {
@@ -32,6 +29,8 @@ pub struct Options {
     pub what: Vec<(Kind, Option<usize>)>,
     /// Cells at every magnitude.
     pub trials: usize,
+    /// Sets without an effect from which the stated magnitude comes: each has its own noise, and its own estimate of it.
+    pub sets: usize,
     /// Magnitudes, over the stated one.
     pub levels: Vec<f64>,
     /// The plan: readings, of them repeats, and the declared noise.
@@ -116,8 +115,8 @@ struct Logistic {
 pub fn check(base: &SceneFile, options: &Options, watcher: &dyn Watcher) -> Result<Report, ChallengeError> {
     let key = case::key(options.seed);
     let public = case::public(base, &options.plan, &key, 0)?;
-    watcher.begin("no effect", SETS);
-    let quiet: Vec<Diagnosis> = (0..SETS)
+    watcher.begin("no effect", options.sets);
+    let quiet: Vec<Diagnosis> = (0..options.sets)
         .into_par_iter()
         .map(|set| {
             let found = cell(&public, Vec::new(), &injected_key(&key, &format!("power/quiet/{set}")))?;
@@ -171,7 +170,7 @@ pub fn check(base: &SceneFile, options: &Options, watcher: &dyn Watcher) -> Resu
     }
     Ok(Report {
         curves,
-        sets: SETS,
+        sets: options.sets,
         false_alarms: quiet.iter().filter(|found| !found.effects.is_empty()).count(),
         readings: public.planned.len(),
         noise_m: public.file.scene.sensor.position_sigma_m,
