@@ -48,6 +48,8 @@ pub struct Bench<'a> {
     surviving: &'a Surviving,
     prior: NoisePrior,
     noise: f64,
+    /// What is found already, each with the scale of its prior.
+    found: &'a [(usize, usize)],
     /// Of every hypothesis, the inverse of its inner products.
     inverses: Vec<DMatrix<f64>>,
     /// Draws of standard normals that all claims share, so that one can be compared with another.
@@ -102,9 +104,15 @@ struct Draw {
 
 impl<'a> Bench<'a> {
     /// For data whose inner products are `surviving`, with a noise of mean square `noise` (in declared sigmas) of which `prior` is known
-    /// beforehand.
+    /// beforehand, and with the effects `found`, beside which everything else has to show.
     #[must_use]
-    pub fn new(candidates: &'a Candidates, surviving: &'a Surviving, prior: NoisePrior, noise: f64) -> Bench<'a> {
+    pub fn new(
+        candidates: &'a Candidates,
+        surviving: &'a Surviving,
+        prior: NoisePrior,
+        noise: f64,
+        found: &'a [(usize, usize)],
+    ) -> Bench<'a> {
         let inverses = (0..candidates.hypotheses.len())
             .map(|hypothesis| {
                 let columns = candidates.columns(hypothesis);
@@ -125,7 +133,7 @@ impl<'a> Bench<'a> {
                 turn: stream.uniform(0.2, 1.0),
             })
             .collect();
-        Bench { candidates, surviving, prior, noise: noise.max(1e-12), inverses, pool }
+        Bench { candidates, surviving, prior, noise: noise.max(1e-12), found, inverses, pool }
     }
 
     fn information(&self, hypothesis: usize) -> f64 {
@@ -237,7 +245,10 @@ impl<'a> Bench<'a> {
         number: usize,
         count: usize,
     ) -> Option<World> {
-        shares.retain(|(_, share)| *share >= UNLIKE);
+        let apart = |member: usize| !variants.contains(&member) && !self.candidates.exclude(member, truth);
+        let beside: Vec<(usize, usize)> = self.found.iter().copied().filter(|(member, _)| apart(*member)).collect();
+        let taken = |other: usize| beside.iter().any(|(member, _)| self.candidates.exclude(*member, other));
+        shares.retain(|(other, share)| *share >= UNLIKE && !taken(*other));
         shares.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let mut chosen = vec![truth];
         let mut room = COLUMNS - self.candidates.columns(truth).len();
@@ -254,7 +265,21 @@ impl<'a> Bench<'a> {
         chosen[1..].sort_by_key(|other| !variants.contains(other));
         let columns: Vec<usize> = chosen.iter().flat_map(|member| self.candidates.columns(*member)).collect();
         let size = columns.len();
-        let products = DMatrix::from_fn(size, size, |i, j| self.surviving.products[(columns[i], columns[j])]);
+        let mut products = DMatrix::from_fn(size, size, |i, j| self.surviving.products[(columns[i], columns[j])]);
+        // What is found takes its part out of everything else.
+        let fitted: Vec<(usize, f64)> = beside
+            .iter()
+            .flat_map(|(member, scale)| {
+                self.candidates.columns(*member).map(|column| (column, 1.0 / (SCALES[*scale].0 * SCALES[*scale].0)))
+            })
+            .collect();
+        if !fitted.is_empty() {
+            let normal = DMatrix::from_fn(fitted.len(), fitted.len(), |i, j| {
+                self.surviving.products[(fitted[i].0, fitted[j].0)] + if i == j { fitted[i].1 } else { 0.0 }
+            });
+            let cross = DMatrix::from_fn(fitted.len(), size, |i, j| self.surviving.products[(fitted[i].0, columns[j])]);
+            products -= cross.tr_mul(&Cholesky::new(normal)?.solve(&cross));
+        }
         let mut axes = DMatrix::zeros(size, size);
         let mut members = Vec::with_capacity(chosen.len());
         let mut inverse = vec![[0.0; SCALES.len()]; size];
@@ -556,11 +581,12 @@ mod tests {
     fn the_least_magnitude_is_named_in_four_cases_of_five() {
         let prior = NoisePrior { freedom: 10.0, level: 1.0 };
         let noise: f64 = 1.7;
-        for likeness in [0.2, 0.9] {
+        for (likeness, found) in [(0.2, vec![]), (0.9, vec![]), (0.6, vec![(5, 1)])] {
             let (candidates, signatures) = problem(likeness);
             let unit = surviving(&signatures, &DVector::zeros(ROWS));
-            let bench = Bench::new(&candidates, &unit, prior, noise);
-            for variants in [vec![0], vec![1], vec![3, 4], vec![5], vec![6]] {
+            let bench = Bench::new(&candidates, &unit, prior, noise, &found);
+            let base = |with: &[(usize, usize)]| [&found[..], with].concat();
+            for variants in [vec![0], vec![1], vec![3, 4], vec![6]] {
                 let least = bench.power(&variants).least.unwrap();
                 let mut draws = stream(9, &format!("test/cases/{variants:?}"));
                 let cases = 600;
@@ -575,11 +601,16 @@ mod tests {
                         let spread = candidates.hypotheses[truth].spread[i];
                         residual += signatures.column(column) * (least * share / (candidates.unit[truth] * spread));
                     }
+                    for (member, _) in &found {
+                        residual += signatures.column(candidates.first[*member]) * 2.3;
+                    }
                     let seen = surviving(&signatures, &residual);
+                    let without = log_posterior(&seen, &candidates, prior, &base(&[]));
                     let (mut own, mut all, mut best) = (0.0, 1.0, (0.0, false));
-                    for member in 0..candidates.hypotheses.len() {
+                    for member in (0..candidates.hypotheses.len()).filter(|member| found.iter().all(|(other, _)| other != member))
+                    {
                         for scale in 0..SCALES.len() {
-                            let log = log_posterior(&seen, &candidates, prior, &[(member, scale)]);
+                            let log = log_posterior(&seen, &candidates, prior, &base(&[(member, scale)])) - without;
                             all += log.exp();
                             if variants.contains(&member) {
                                 own += log.exp();
@@ -604,14 +635,14 @@ mod tests {
         let copy = signatures.column(0) * 1.0;
         signatures.set_column(1, &copy);
         let unit = surviving(&signatures, &DVector::zeros(ROWS));
-        let bench = Bench::new(&candidates, &unit, NoisePrior { freedom: 10.0, level: 1.0 }, 1.0);
+        let bench = Bench::new(&candidates, &unit, NoisePrior { freedom: 10.0, level: 1.0 }, 1.0, &[]);
         // Of two that are the same the one that is less likely beforehand is never named.
         let power = bench.power(&[1]);
         assert_eq!(power.least, None);
         assert!(power.alike.is_some_and(|(other, likeness)| other == 0 && likeness > 0.999));
         signatures.fill_column(8, 0.0);
         let unit = surviving(&signatures, &DVector::zeros(ROWS));
-        let bench = Bench::new(&candidates, &unit, NoisePrior { freedom: 10.0, level: 1.0 }, 1.0);
+        let bench = Bench::new(&candidates, &unit, NoisePrior { freedom: 10.0, level: 1.0 }, 1.0, &[]);
         assert_eq!(bench.power(&[6]), Power { least: None, alike: None });
     }
 

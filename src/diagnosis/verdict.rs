@@ -365,7 +365,7 @@ fn detectability(analysis: &Analysis<'_>, noise: f64) -> (Vec<Undetectable>, Vec
             (None, None) => {}
         }
     }
-    let bench = Bench::new(candidates, analysis.surviving, analysis.noise, noise);
+    let bench = Bench::new(candidates, analysis.surviving, analysis.noise, noise, &analysis.found.best.members);
     let powers: Vec<_> = claims.par_iter().map(|(_, _, variants)| bench.power(variants)).collect();
     let (mut undetectable, mut detectable) = (Vec::new(), Vec::new());
     let (mut seen, mut all) = (0.0, 0.0);
