@@ -595,7 +595,7 @@ mod tests {
                     let truth = variants[case % variants.len()];
                     let mut residual = DVector::from_fn(ROWS, |_, _| noise.sqrt() * draws.normal());
                     let phase = draws.uniform(0.0, std::f64::consts::TAU);
-                    let sign = if truth == 0 || truth == 6 || phase < 3.14 { 1.0 } else { -1.0 };
+                    let sign = if truth == 0 || truth == 6 || phase < std::f64::consts::PI { 1.0 } else { -1.0 };
                     for (i, column) in candidates.columns(truth).enumerate() {
                         let share = if candidates.columns(truth).len() == 1 { sign } else { [phase.cos(), phase.sin()][i] };
                         let spread = candidates.hypotheses[truth].spread[i];
