@@ -263,6 +263,8 @@ fn scored(global: &Global, options: &ScoreOptions) -> anyhow::Result<Outcome> {
         written.push(path);
         Ok(())
     };
+    // Opened: from here on it can be looked at case by case.
+    put("truth.json", format!("{}\n", serde_json::to_string_pretty(&sealed.cases)?).as_bytes())?;
     put("score.json", format!("{}\n", serde_json::to_string_pretty(&score)?).as_bytes())?;
     put("score-confusion.csv", &report::challenge::confusion(&score.confusion)?)?;
     put("score.svg", figure.svg()?.as_bytes())?;

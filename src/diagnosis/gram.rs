@@ -30,10 +30,10 @@ pub struct Surviving {
 }
 
 impl Gram {
-    /// Of the whitened rows `matrix`.
+    /// Of the whitened rows `matrix`. (A product of matrices is blocked and vectorised, `tr_mul` is neither.)
     #[must_use]
     pub fn new(matrix: &DMatrix<f64>, geometry: usize) -> Gram {
-        Gram { products: matrix.tr_mul(matrix), geometry, equations: matrix.nrows() as f64 }
+        Gram { products: matrix.transpose() * matrix, geometry, equations: matrix.nrows() as f64 }
     }
 
     /// Without the rows of `part`.
@@ -42,28 +42,28 @@ impl Gram {
         Gram { products: &self.products - &part.products, geometry: self.geometry, equations: self.equations - part.equations }
     }
 
-    /// Everything that the geometry can absorb taken out. `used`: the parameters that may move; `offset`: the prior's pull on each
-    /// (the fitted values over sigma, zero where free).
+    /// Everything that the geometry can absorb taken out. `offset`: the prior's pull on each parameter (the fitted values over sigma,
+    /// zero where free).
     #[must_use]
-    pub fn surviving(&self, used: &[bool], offset: &DVector<f64>) -> Option<Surviving> {
-        let columns: Vec<usize> = (0..self.geometry).filter(|column| used[*column]).collect();
-        let rest = self.products.ncols() - self.geometry;
-        let normal = DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
-            self.products[(columns[i], columns[j])] + f64::from(u8::from(i == j))
-        });
-        let mut mixed = DMatrix::from_fn(columns.len(), rest, |i, j| self.products[(columns[i], self.geometry + j)]);
-        for (i, column) in columns.iter().enumerate() {
-            mixed[(i, rest - 1)] -= offset[*column];
+    pub fn surviving(&self, offset: &DVector<f64>) -> Option<Surviving> {
+        let (count, rest) = (self.geometry, self.products.ncols() - self.geometry);
+        let mut normal = self.products.view((0, 0), (count, count)).into_owned();
+        for column in 0..count {
+            normal[(column, column)] += 1.0;
+        }
+        let mut mixed = self.products.view((0, count), (count, rest)).into_owned();
+        for column in 0..count {
+            mixed[(column, rest - 1)] -= offset[column];
         }
         let cholesky = Cholesky::new(normal)?;
         let absorbed = cholesky.solve(&mixed);
         let mut left = self.products.view((self.geometry, self.geometry), (rest, rest)).into_owned();
-        left -= mixed.tr_mul(&absorbed);
+        left -= mixed.transpose() * &absorbed;
         let inverse = cholesky.inverse();
-        let pinned: f64 = (0..columns.len()).map(|i| inverse[(i, i)]).sum();
-        let freedom = self.equations - (columns.len() as f64 - pinned);
+        let pinned: f64 = (0..count).map(|i| inverse[(i, i)]).sum();
+        let freedom = self.equations - (count as f64 - pinned);
         let last = rest - 1;
-        let prior: f64 = columns.iter().map(|column| offset[*column] * offset[*column]).sum();
+        let prior = offset.norm_squared();
         Some(Surviving {
             products: left.view((0, 0), (last, last)).into_owned(),
             with_residual: left.view((0, last), (last, 1)).column(0).into_owned(),

@@ -1,29 +1,76 @@
 //! Nested cross-validation: effects are chosen again without each fold, and the fold shows what they are worth.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector, Vector3};
+use serde::{Deserialize, Serialize};
 
+use super::FOLDS;
 use super::evidence::{Candidates, NoisePrior, fit};
 use super::gram::{Gram, Surviving};
+use super::groups::Groups;
+use super::rows::Rows;
 use super::search::search;
+use crate::measurement::Measurement;
 
 /// Rows of the linear problem with what the search needs.
-pub struct Problem<'a> {
+#[derive(Clone, Debug)]
+pub struct Problem {
     /// `[geometry | signatures | residual]`, m and rad.
-    pub raw: &'a DMatrix<f64>,
-    /// One over sigma of each equation.
-    pub whitening: &'a DVector<f64>,
+    pub raw: DMatrix<f64>,
+    /// One over sigma of each equation, times the root of its row's weight.
+    pub whitening: DVector<f64>,
     /// Equations per row.
     pub per_row: usize,
     /// Geometric parameters.
     pub geometry: usize,
     /// Fitted geometric parameters over their prior's sigma, zero where free.
-    pub offset: &'a DVector<f64>,
+    pub offset: DVector<f64>,
     /// Which geometric parameters are base and target.
-    pub free: &'a [bool],
-    /// Fold of each row.
-    pub fold: &'a [usize],
-    /// Rows that are no outliers.
-    pub good: &'a [bool],
+    pub free: Vec<bool>,
+}
+
+impl Problem {
+    /// The problem of `rows`; `raw` as in [`Problem::raw`].
+    #[must_use]
+    pub fn new(rows: &Rows, raw: DMatrix<f64>) -> Problem {
+        let geometry = rows.jacobian.ncols();
+        let offset = DVector::from_fn(geometry, |column, _| if rows.free[column] { 0.0 } else { rows.parameters[column] });
+        Problem { raw, whitening: rows.whitening.clone(), per_row: rows.per_row, geometry, offset, free: rows.free.clone() }
+    }
+
+    /// The columns of the signatures, m and rad per unit of their coefficients.
+    #[must_use]
+    pub fn signatures(&self) -> DMatrixView<'_, f64> {
+        self.raw.columns(self.geometry, self.raw.ncols() - 1 - self.geometry)
+    }
+
+    /// Inner products fold by fold.
+    #[must_use]
+    pub fn grams(&self, scheme: &Scheme) -> Vec<Gram> {
+        use rayon::prelude::*;
+        (0..scheme.folds)
+            .into_par_iter()
+            .map(|number| {
+                let of_fold = (0..scheme.fold.len()).filter(|row| scheme.fold[*row] == number);
+                let equations: Vec<usize> = of_fold.flat_map(|row| row * self.per_row..(row + 1) * self.per_row).collect();
+                let mut block = self.raw.select_rows(&equations);
+                for mut column in block.column_iter_mut() {
+                    for (value, equation) in column.iter_mut().zip(&equations) {
+                        *value *= self.whitening[*equation];
+                    }
+                }
+                Gram::new(&block, self.geometry)
+            })
+            .collect()
+    }
+
+    /// What geometry and the effects with these coefficients leave, m and rad.
+    #[must_use]
+    pub fn left(&self, surviving: &Surviving, coefficients: &DVector<f64>) -> DVector<f64> {
+        let last = self.raw.ncols() - 1;
+        let signatures = surviving.absorbed.columns(0, last - self.geometry);
+        let change = surviving.absorbed.column(last - self.geometry) - signatures * coefficients;
+        self.raw.column(last) - self.raw.columns(0, self.geometry) * change - self.signatures() * coefficients
+    }
 }
 
 /// What one fold says.
@@ -39,9 +86,85 @@ pub struct Fold {
     pub explained: Vec<f64>,
     /// What was chosen, in the order added.
     pub chosen: Vec<usize>,
+    /// Sets of hypotheses with their probabilities.
+    pub models: Vec<(Vec<(usize, usize)>, f64)>,
 }
 
-/// Folds blocked by region: k-means of the targets from the points farthest from each other.
+/// What leaving out in one way says.
+#[derive(Clone, Debug)]
+pub struct HeldOut {
+    /// What the rows of a fold share.
+    pub by: Block,
+    /// Fold by fold.
+    pub folds: Vec<Fold>,
+}
+
+/// A way of leaving rows out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scheme {
+    /// What the rows of a fold share.
+    pub by: Block,
+    /// Fold of each row.
+    pub fold: Vec<usize>,
+    /// Number of folds.
+    pub folds: usize,
+}
+
+/// What the rows of a fold share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Block {
+    /// A region of the workspace.
+    Region,
+    /// What the tool carries.
+    Payload,
+    /// The session.
+    Session,
+}
+
+/// The ways of leaving out that `measurements` allow: by region first, then by payload and by session where there are several. Rows of
+/// a configuration stay together in a region.
+#[must_use]
+pub fn schemes(measurements: &[&Measurement], targets: &[Vector3<f64>], groups: &Groups) -> Vec<Scheme> {
+    let points: Vec<Vector3<f64>> = groups.rows.iter().map(|rows| targets[rows[0]]).collect();
+    let most = FOLDS.min(points.len() / 4).max(2);
+    let of_group = regions(&points, most);
+    let mut schemes = vec![Scheme::new(Block::Region, groups.of.iter().map(|group| of_group[*group]).collect())];
+    let payload: Vec<f64> = measurements.iter().map(|row| row.payload_kg.unwrap_or(0.0)).collect();
+    let session: Vec<&str> = measurements.iter().map(|row| row.session.as_deref().unwrap_or_default()).collect();
+    let mut payloads = payload.clone();
+    payloads.sort_by(f64::total_cmp);
+    payloads.dedup();
+    let mut sessions = session.clone();
+    sessions.sort_unstable();
+    sessions.dedup();
+    let number = |of: &dyn Fn(usize) -> usize| (0..measurements.len()).map(of).collect::<Vec<_>>();
+    let at_payload = number(&|row| payloads.iter().position(|known| *known == payload[row]).unwrap_or(0) % FOLDS);
+    let at_session = number(&|row| sessions.iter().position(|known| *known == session[row]).unwrap_or(0) % FOLDS);
+    for (by, fold) in [(Block::Payload, at_payload), (Block::Session, at_session)] {
+        let scheme = Scheme::new(by, fold);
+        // What is left must still tell where the arm stands.
+        let enough =
+            (0..scheme.folds).all(|out| 2 * scheme.fold.iter().filter(|fold| **fold != out).count() >= scheme.fold.len() / 2);
+        if scheme.folds > 1 && enough {
+            schemes.push(scheme);
+        }
+    }
+    schemes
+}
+
+impl Scheme {
+    fn new(by: Block, fold: Vec<usize>) -> Scheme {
+        // Regions may be empty.
+        let mut known = fold.clone();
+        known.sort_unstable();
+        known.dedup();
+        let fold: Vec<usize> = fold.iter().map(|of| known.binary_search(of).unwrap_or(0)).collect();
+        Scheme { by, folds: known.len(), fold }
+    }
+}
+
+/// Folds blocked by region: k-means of `points` from those farthest from each other.
 #[must_use]
 pub fn regions(points: &[Vector3<f64>], folds: usize) -> Vec<usize> {
     let centre = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
@@ -73,21 +196,27 @@ pub fn regions(points: &[Vector3<f64>], folds: usize) -> Vec<usize> {
     fold
 }
 
-/// Leaves out each fold in turn.
+/// Leaves out each fold of `scheme` in turn. `good`: rows that are no outliers; only they are counted.
 #[must_use]
 pub fn cross_validate(
-    problem: &Problem<'_>,
+    problem: &Problem,
+    scheme: &Scheme,
+    good: &[bool],
     grams: &[Gram],
     candidates: &Candidates,
     noise: NoisePrior,
     most: usize,
-) -> Vec<Fold> {
+) -> HeldOut {
     use rayon::prelude::*;
     let total = sum(grams);
-    (0..grams.len())
+    let folds = (0..grams.len())
         .into_par_iter()
-        .filter_map(|number| leave_out(problem, &total, grams, number, candidates, noise, most))
-        .collect()
+        .filter_map(|number| {
+            let rows: Vec<usize> = (0..good.len()).filter(|row| scheme.fold[*row] == number && good[*row]).collect();
+            leave_out(problem, &total.without(&grams[number]), &rows, candidates, noise, most)
+        })
+        .collect();
+    HeldOut { by: scheme.by, folds }
 }
 
 /// The sum of all blocks.
@@ -101,28 +230,25 @@ pub fn sum(grams: &[Gram]) -> Gram {
     total
 }
 
+/// `train`: inner products of all rows but those of the fold; `rows`: those of the fold that count.
 fn leave_out(
-    problem: &Problem<'_>,
-    total: &Gram,
-    grams: &[Gram],
-    number: usize,
+    problem: &Problem,
+    train: &Gram,
+    rows: &[usize],
     candidates: &Candidates,
     noise: NoisePrior,
     most: usize,
 ) -> Option<Fold> {
-    let train = total.without(&grams[number]);
-    let all = vec![true; problem.geometry];
-    let surviving = train.surviving(&all, problem.offset)?;
-    let found = search(&surviving, candidates, noise, most);
-    let rows: Vec<usize> = (0..problem.fold.len()).filter(|row| problem.fold[*row] == number && problem.good[*row]).collect();
     if rows.is_empty() {
         return None;
     }
+    let surviving = train.surviving(&problem.offset)?;
+    let found = search(&surviving, candidates, noise, most);
     let last = problem.raw.ncols() - 1;
-    let squares = |surviving: &Surviving, members: &[(usize, usize)]| -> Option<f64> {
+    let squares = |members: &[(usize, usize)]| -> Option<f64> {
         let mut coefficients = DVector::zeros(last - problem.geometry);
         if !members.is_empty() {
-            let fit = fit(surviving, candidates, noise, members)?;
+            let fit = fit(&surviving, candidates, noise, members)?;
             for (column, value) in fit.columns.iter().zip(fit.coefficients.iter()) {
                 coefficients[*column] = *value;
             }
@@ -131,11 +257,13 @@ fn leave_out(
         let signatures = surviving.absorbed.columns(0, last - problem.geometry);
         let change = surviving.absorbed.column(last - problem.geometry) - signatures * &coefficients;
         let mut sum = 0.0;
-        for row in &rows {
+        for row in rows {
             for axis in 0..3 {
                 let equation = problem.raw.row(row * problem.per_row + axis);
                 let geometry: f64 = (0..problem.geometry).map(|column| equation[column] * change[column]).sum();
-                let effects: f64 = surviving_columns(members, candidates)
+                let effects: f64 = members
+                    .iter()
+                    .flat_map(|(hypothesis, _)| candidates.columns(*hypothesis))
                     .map(|column| equation[problem.geometry + column] * coefficients[column])
                     .sum();
                 let left = equation[last] - geometry - effects;
@@ -144,51 +272,44 @@ fn leave_out(
         }
         Some(sum)
     };
-    let geometry = squares(&surviving, &[])?;
+    let geometry = squares(&[])?;
     let mut explained = Vec::new();
     for count in 1..=found.best.members.len() {
-        explained.push(squares(&surviving, &found.best.members[..count])?);
+        explained.push(squares(&found.best.members[..count])?);
     }
     Some(Fold {
         rows: rows.len(),
-        nominal: nominal(problem, number, &rows)?,
+        nominal: nominal(problem, train, rows)?,
         geometry,
         explained,
         chosen: found.best.members.iter().map(|(hypothesis, _)| *hypothesis).collect(),
+        models: found.models,
     })
 }
 
-fn surviving_columns<'a>(members: &'a [(usize, usize)], candidates: &'a Candidates) -> impl Iterator<Item = usize> + 'a {
-    members.iter().flat_map(|(hypothesis, _)| candidates.columns(*hypothesis))
-}
-
-/// Base and target fitted to all other folds; sum of squares of this fold's positions.
-fn nominal(problem: &Problem<'_>, number: usize, rows: &[usize]) -> Option<f64> {
+/// Base and target fitted to all other folds (inner products `train`); sum of squares of the positions of `rows`.
+fn nominal(problem: &Problem, train: &Gram, rows: &[usize]) -> Option<f64> {
     let free: Vec<usize> = (0..problem.geometry).filter(|column| problem.free[*column]).collect();
     let last = problem.raw.ncols() - 1;
-    let equations = problem.raw.nrows();
     // What the nominal arm leaves: the fitted frames taken back.
-    let back = DVector::from_fn(problem.geometry, |column, _| problem.offset[column]);
-    let residual = problem.raw.column(last) + problem.raw.columns(0, problem.geometry) * back;
-    let mut matrix = DMatrix::zeros(equations, free.len() + 1);
-    for (at, column) in free.iter().enumerate() {
-        matrix.set_column(at, &problem.raw.column(*column));
-    }
-    matrix.set_column(free.len(), &residual);
-    let mut whitening = problem.whitening.clone();
-    for row in 0..problem.fold.len() {
-        if problem.fold[row] == number {
-            whitening.rows_mut(row * problem.per_row, problem.per_row).fill(0.0);
-        }
-    }
-    let gram = Gram::new(&super::rows::scaled(&matrix, &whitening), free.len());
-    let change = gram.surviving(&vec![true; free.len()], &DVector::zeros(free.len()))?.absorbed;
+    let back = |equation: usize| -> f64 {
+        let fitted: f64 = (0..problem.geometry).map(|column| problem.raw[(equation, column)] * problem.offset[column]).sum();
+        problem.raw[(equation, last)] + fitted
+    };
+    let count = free.len();
+    // Base and target answer to it with the priors' unit precision, as the joint fit does.
+    let normal = DMatrix::from_fn(count, count, |i, j| train.products[(free[i], free[j])] + f64::from(u8::from(i == j)));
+    let right = DVector::from_fn(count, |i, _| {
+        let fitted: f64 = (0..problem.geometry).map(|column| train.products[(free[i], column)] * problem.offset[column]).sum();
+        train.products[(free[i], last)] + fitted
+    });
+    let change = Cholesky::new(normal)?.solve(&right);
     let mut sum = 0.0;
     for row in rows {
         for axis in 0..3 {
             let equation = row * problem.per_row + axis;
-            let fitted: f64 = (0..free.len()).map(|at| matrix[(equation, at)] * change[(at, 0)]).sum();
-            let left = matrix[(equation, free.len())] - fitted;
+            let fitted: f64 = (0..count).map(|at| problem.raw[(equation, free[at])] * change[at]).sum();
+            let left = back(equation) - fitted;
             sum += left * left;
         }
     }

@@ -7,6 +7,7 @@
 pub mod conditions;
 pub mod evidence;
 pub mod gram;
+pub mod groups;
 pub mod held_out;
 pub mod open_set;
 pub mod outcome;
@@ -22,21 +23,23 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::Arm;
 use crate::effects::signature::library::{Hypothesis, library};
-use crate::effects::signature::shape::Shape;
+use crate::effects::signature::shape::{Displacement, Shape};
 use crate::effects::{Kind, Location};
 use crate::measurement::{Measurement, Sensor};
 use conditions::Conditions;
 use evidence::{Candidates, NoisePrior};
-use gram::{Gram, Surviving};
+use gram::Surviving;
+use groups::Repeats;
+use held_out::{Block, Problem};
 use outcome::{Diagnosis, NoiseSource};
-use rows::{DiagnosisError, Rows};
+use rows::{DiagnosisError, Readings, Rows};
 
 /// Folds of the cross-validation.
 pub const FOLDS: usize = 5;
 /// Prior odds of one effect more.
 const ODDS: f64 = 0.5;
-/// Rounds of weighting outliers down.
-const PASSES: usize = 4;
+/// Rounds of fitting around what was found.
+const PASSES: usize = 5;
 /// Share of the prior of shapes without a name.
 const NAMELESS: f64 = 0.25;
 /// λ at the upper end of the realistic range below which a hypothesis has no information in the data.
@@ -61,23 +64,16 @@ pub(crate) struct Analysis<'a> {
     pub(crate) surviving: &'a Surviving,
     pub(crate) noise: NoisePrior,
     pub(crate) found: search::Found,
-    pub(crate) folds: Vec<held_out::Fold>,
+    pub(crate) held_out: Vec<held_out::HeldOut>,
     pub(crate) structure: open_set::Structure,
     pub(crate) outliers: outliers::Outliers,
     pub(crate) maps: Vec<outcome::Map>,
     pub(crate) measurements: &'a [&'a Measurement],
     pub(crate) sensor: &'a Sensor,
     pub(crate) repeats: Option<Repeats>,
+    /// Correlation of residuals of the same configuration, where there are any.
+    pub(crate) correlation: Option<f64>,
     pub(crate) options: &'a Options,
-}
-
-/// Noise from repeats.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Repeats {
-    /// One sigma per axis, m.
-    pub(crate) position_m: f64,
-    /// Degrees of freedom.
-    pub(crate) freedom: f64,
 }
 
 /// Diagnoses `measurements` of `arm`, read by `sensor`.
@@ -91,45 +87,33 @@ pub fn diagnose(
     options: &Options,
 ) -> Result<Diagnosis, DiagnosisError> {
     let total = measurements.len();
-    let rows = rows::fit(arm, sensor, measurements, &vec![1.0; total])?;
-    let conditions = conditions::conditions(measurements, &rows);
-    let hypotheses: Vec<Hypothesis> = library(&rows.mechanism, &conditions.columns)
-        .into_iter()
-        .filter(|hypothesis| hypothesis.kind.is_none_or(|kind| !options.without.contains(&kind)))
-        .filter(|hypothesis| {
-            let is = |(kind, place): &(Kind, Location)| hypothesis.kind == Some(*kind) && hypothesis.location == *place;
-            options.only.as_ref().is_none_or(|only| only.iter().any(is))
-        })
-        .collect();
-    let repeats = repeats(measurements);
-    let noise = match (repeats, options.noise) {
-        (Some(repeats), _) => {
-            let declared = mean_sigma(sensor, measurements);
-            NoisePrior {
-                freedom: repeats.freedom.min(20.0),
-                level: (repeats.position_m / declared) * (repeats.position_m / declared),
-            }
-        }
-        (None, NoiseSource::Assumed) => NoisePrior { freedom: 1.0, level: 1.0 },
-        (None, _) => NoisePrior { freedom: 10.0, level: 1.0 },
-    };
-    let (raw, mut candidates) = matrix(&rows, &conditions, hypotheses);
-    let geometry = rows.jacobian.ncols();
-    let offset = DVector::from_fn(geometry, |column, _| if rows.free[column] { 0.0 } else { rows.parameters[column] });
-    let fold = held_out::regions(&rows.targets, FOLDS.min(total / 4).max(2));
-    let folds = fold.iter().max().map_or(1, |most| most + 1);
-
-    let all = vec![true; geometry];
-    let mut weights = vec![1.0; total];
-    let mut result = None;
-    // Readings that are far off from the best model are weighted down, until it stays the same.
+    let groups = groups::groups(measurements);
+    let repeats = groups::repeats(measurements, &groups);
+    let noise = noise_prior(repeats, mean_sigma(sensor, measurements), options.noise);
+    let mut dependent = vec![1.0; total];
+    let mut far = vec![1.0; total];
+    let mut displacement: Vec<Displacement> = Vec::new();
+    let mut before = Vec::new();
+    // Around the arm as it is with the effects found so far, until nothing changes: signatures are those of the fitted arm, readings
+    // that are far off from the best model or that repeat others are weighted down, and geometry and effects are fitted together.
     for pass in 0..PASSES {
-        let mut whitening = rows.whitening.clone();
-        for (row, weight) in weights.iter().enumerate() {
-            whitening.rows_mut(row * rows.per_row, rows.per_row).scale_mut(libm::sqrt(*weight));
-        }
-        let grams = blocks(&raw, &whitening, &fold, folds, rows.per_row, geometry);
-        let Some(mut surviving) = held_out::sum(&grams).surviving(&all, &offset) else {
+        let weights: Vec<f64> = dependent.iter().zip(&far).map(|(a, b)| a * b).collect();
+        let rows = rows::fit(arm, Readings { sensor, measurements, weights: &weights, displacement: &displacement })?;
+        let conditions = conditions::conditions(measurements, &rows);
+        let hypotheses: Vec<Hypothesis> = library(&rows.mechanism, &conditions.columns)
+            .into_iter()
+            .filter(|hypothesis| hypothesis.kind.is_none_or(|kind| !options.without.contains(&kind)))
+            .filter(|hypothesis| {
+                let is = |(kind, place): &(Kind, Location)| hypothesis.kind == Some(*kind) && hypothesis.location == *place;
+                options.only.as_ref().is_none_or(|only| only.iter().any(is))
+            })
+            .collect();
+        let (mut raw, mut candidates) = matrix(&rows, &conditions, hypotheses);
+        put_back(&mut raw, &rows, &displacement);
+        let problem = Problem::new(&rows, raw);
+        let schemes = held_out::schemes(measurements, &rows.targets, &groups);
+        let grams = problem.grams(&schemes[0]);
+        let Some(mut surviving) = held_out::sum(&grams).surviving(&problem.offset) else {
             return Err(DiagnosisError::Degenerate);
         };
         // A row that counts half is half an equation.
@@ -137,70 +121,106 @@ pub fn diagnose(
         surviving.freedom = (surviving.freedom - lost).max(1.0);
         weigh(&mut candidates, &surviving);
         let found = search::search(&surviving, &candidates, noise, search::MOST);
-        let residual = residual(&raw, &surviving, &candidates, noise, &found.best.members, geometry);
-        let squares: Vec<f64> = (0..total)
-            .map(|row| {
-                let (first, count) = (row * rows.per_row, rows.per_row);
-                residual.rows(first, count).component_mul(&rows.whitening.rows(first, count)).norm_squared()
+        let coefficients = coefficients(&surviving, &candidates, noise, &found.best.members);
+        let residual = problem.left(&surviving, &coefficients);
+        // In declared sigmas, whatever a row's weight.
+        let sigmas: Vec<f64> = (0..residual.len())
+            .map(|equation| residual[equation] * problem.whitening[equation] / libm::sqrt(weights[equation / rows.per_row]))
+            .collect();
+        let squares: Vec<f64> =
+            sigmas.chunks(rows.per_row).map(|row| row.iter().map(|value| value * value).sum::<f64>()).collect();
+        let next_far = outliers::weights(&squares, rows.per_row);
+        let good: Vec<bool> = next_far.iter().map(|weight| *weight > 0.5).collect();
+        let (next_dependent, correlation) = groups::weights(&groups, &sigmas, rows.per_row, &good);
+        let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-2);
+        let mut members: Vec<(usize, usize)> = found.best.members.clone();
+        members.sort_unstable();
+        let settled = same(&next_far, &far) && same(&next_dependent, &dependent) && members == before;
+        if pass + 1 < PASSES && !settled {
+            displacement = displaced(&problem, &rows, &coefficients);
+            (far, dependent, before) = (next_far, next_dependent, members);
+            continue;
+        }
+        let outliers = outliers::look(&squares, rows.per_row);
+        let good: Vec<bool> = (0..total).map(|row| !outliers.rows.contains(&row)).collect();
+        let held_out: Vec<held_out::HeldOut> = schemes
+            .iter()
+            .map(|scheme| {
+                let grams = if scheme.by == Block::Region { grams.clone() } else { problem.grams(scheme) };
+                held_out::cross_validate(&problem, scheme, &good, &grams, &candidates, noise, search::MOST)
             })
             .collect();
-        let next = outliers::weights(&squares, rows.per_row);
-        let same = next.iter().zip(&weights).all(|(a, b)| (a - b).abs() < 1e-3);
-        let last = pass + 1 == PASSES || same;
-        if last {
-            result = Some((grams, whitening, surviving, found, residual, squares));
-            break;
-        }
-        weights = next;
+        let position = |weighted: bool| -> Vec<Vector3<f64>> {
+            (0..total)
+                .map(|row| {
+                    let first = row * rows.per_row;
+                    let weight = if weighted { problem.whitening[first] } else { 1.0 };
+                    Vector3::from(residual.fixed_rows::<3>(first)) * weight
+                })
+                .collect()
+        };
+        let structure = open_set::structure(&conditions, &position(true));
+        let maps = open_set::maps(&conditions, &position(false));
+        let analysis = Analysis {
+            rows: &rows,
+            conditions: &conditions,
+            candidates: &candidates,
+            surviving: &surviving,
+            noise,
+            found,
+            held_out,
+            structure,
+            outliers,
+            maps,
+            measurements,
+            sensor,
+            repeats,
+            correlation: (groups.rows.len() < total).then_some(correlation),
+            options,
+        };
+        return Ok(verdict::put(&analysis));
     }
-    let Some((grams, whitening, surviving, found, residual, squares)) = result else {
-        return Err(DiagnosisError::Degenerate);
-    };
-    let outliers = outliers::look(&squares, rows.per_row, surviving.freedom / surviving_equations(&rows));
-    let good: Vec<bool> = (0..total).map(|row| !outliers.rows.contains(&row)).collect();
-    let problem = held_out::Problem {
-        raw: &raw,
-        whitening: &whitening,
-        per_row: rows.per_row,
-        geometry,
-        offset: &offset,
-        free: &rows.free,
-        fold: &fold,
-        good: &good,
-    };
-    let folds = held_out::cross_validate(&problem, &grams, &candidates, noise, search::MOST);
-    let position = |weighted: bool| -> Vec<Vector3<f64>> {
-        (0..total)
-            .map(|row| {
-                let first = row * rows.per_row;
-                let weight = if weighted { libm::sqrt(weights[row]) * rows.whitening[first] } else { 1.0 };
-                Vector3::from(residual.fixed_rows::<3>(first)) * weight
-            })
-            .collect()
-    };
-    let structure = open_set::structure(&conditions, &position(true));
-    let maps = open_set::maps(&conditions, &position(false));
-    let analysis = Analysis {
-        rows: &rows,
-        conditions: &conditions,
-        candidates: &candidates,
-        surviving: &surviving,
-        noise,
-        found,
-        folds,
-        structure,
-        outliers,
-        maps,
-        measurements,
-        sensor,
-        repeats,
-        options,
-    };
-    Ok(verdict::put(&analysis))
+    Err(DiagnosisError::Degenerate)
 }
 
-fn surviving_equations(rows: &Rows) -> f64 {
-    rows.residual.len() as f64
+/// What is known of the noise: from repeats where there are any, else what is said.
+fn noise_prior(repeats: Option<Repeats>, declared_m: f64, source: NoiseSource) -> NoisePrior {
+    match (repeats, source) {
+        (Some(repeats), _) => {
+            let level = (repeats.position_m / declared_m) * (repeats.position_m / declared_m);
+            // Without a move between them they say little about the arm.
+            NoisePrior { freedom: repeats.freedom.min(if repeats.moved { 20.0 } else { 4.0 }), level }
+        }
+        (None, NoiseSource::Assumed) => NoisePrior { freedom: 1.0, level: 1.0 },
+        (None, _) => NoisePrior { freedom: 10.0, level: 1.0 },
+    }
+}
+
+/// Coefficients of all signatures, zero for those that are no members.
+fn coefficients(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior, members: &[(usize, usize)]) -> DVector<f64> {
+    let mut coefficients = DVector::zeros(surviving.products.ncols());
+    if let Some(fit) = evidence::fit(surviving, candidates, noise, members) {
+        for (column, value) in fit.columns.iter().zip(fit.coefficients.iter()) {
+            coefficients[*column] = *value;
+        }
+    }
+    coefficients
+}
+
+/// What the effects do to each row, in root.
+fn displaced(problem: &Problem, rows: &Rows, coefficients: &DVector<f64>) -> Vec<Displacement> {
+    let made = problem.signatures() * coefficients;
+    made.as_slice().chunks(rows.per_row).map(|row| std::array::from_fn(|at| row.get(at).copied().unwrap_or(0.0))).collect()
+}
+
+/// The residual as it would be without the effects that were taken out before the fit.
+fn put_back(raw: &mut DMatrix<f64>, rows: &Rows, displacement: &[Displacement]) {
+    let last = raw.ncols() - 1;
+    for (row, displacement) in displacement.iter().enumerate() {
+        for equation in 0..rows.per_row {
+            raw[(row * rows.per_row + equation, last)] += displacement[equation];
+        }
+    }
 }
 
 /// Mean sigma of a position, m.
@@ -235,30 +255,6 @@ fn matrix(rows: &Rows, conditions: &Conditions, hypotheses: Vec<Hypothesis>) -> 
     }
     let count = hypotheses.len();
     (raw, Candidates { hypotheses, first, unit, log_odds: vec![0.0; count], active: vec![true; count] })
-}
-
-/// Inner products fold by fold.
-fn blocks(
-    raw: &DMatrix<f64>,
-    whitening: &DVector<f64>,
-    fold: &[usize],
-    folds: usize,
-    per_row: usize,
-    geometry: usize,
-) -> Vec<Gram> {
-    use rayon::prelude::*;
-    (0..folds)
-        .into_par_iter()
-        .map(|number| {
-            let equations: Vec<usize> =
-                (0..fold.len()).filter(|row| fold[*row] == number).flat_map(|row| row * per_row..(row + 1) * per_row).collect();
-            let mut block = raw.select_rows(&equations);
-            for (at, equation) in equations.iter().enumerate() {
-                block.row_mut(at).scale_mut(whitening[*equation]);
-            }
-            Gram::new(&block, geometry)
-        })
-        .collect()
 }
 
 /// A class of hypotheses that share one prior.
@@ -318,56 +314,4 @@ fn weigh(candidates: &mut Candidates, surviving: &Surviving) {
         log_odds[*number] = libm::log(ODDS * share / (classes * places * variants));
     }
     candidates.log_odds = log_odds;
-}
-
-/// What geometry and `members` together leave, m and rad.
-fn residual(
-    raw: &DMatrix<f64>,
-    surviving: &Surviving,
-    candidates: &Candidates,
-    noise: NoisePrior,
-    members: &[(usize, usize)],
-    geometry: usize,
-) -> DVector<f64> {
-    let last = raw.ncols() - 1;
-    let mut coefficients = DVector::zeros(last - geometry);
-    if let Some(fit) = evidence::fit(surviving, candidates, noise, members) {
-        for (column, value) in fit.columns.iter().zip(fit.coefficients.iter()) {
-            coefficients[*column] = *value;
-        }
-    }
-    let change = surviving.absorbed.column(last - geometry) - surviving.absorbed.columns(0, last - geometry) * &coefficients;
-    raw.column(last) - raw.columns(0, geometry) * change - raw.columns(geometry, last - geometry) * coefficients
-}
-
-/// Noise from readings of the same configuration, approached and loaded alike.
-fn repeats(measurements: &[&Measurement]) -> Option<Repeats> {
-    let mut used = vec![false; measurements.len()];
-    let (mut squares, mut freedom) = (Vec::new(), 0.0);
-    for first in 0..measurements.len() {
-        if used[first] {
-            continue;
-        }
-        let a = measurements[first];
-        let alike = |b: &Measurement| {
-            a.pose_id == b.pose_id
-                && a.joints == b.joints
-                && a.approach == b.approach
-                && a.payload_kg == b.payload_kg
-                && a.target == b.target
-        };
-        let group: Vec<usize> = (first..measurements.len()).filter(|row| alike(measurements[*row])).collect();
-        for row in &group {
-            used[*row] = true;
-        }
-        if group.len() < 2 {
-            continue;
-        }
-        let points: Vec<Vector3<f64>> = group.iter().map(|row| measurements[*row].position().coords).collect();
-        let centre = conditions::centre(&points);
-        squares.extend(points.iter().map(|point| (point - centre).norm_squared()));
-        freedom += 3.0 * (group.len() - 1) as f64;
-    }
-    let sum: f64 = squares.iter().sum();
-    (freedom >= 9.0 && sum > 0.0).then(|| Repeats { position_m: libm::sqrt(sum / freedom), freedom })
 }

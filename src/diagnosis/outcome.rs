@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::held_out::Block;
 use crate::effects::Level;
 
 /// JSON Schema of [`Diagnosis`].
@@ -78,7 +79,7 @@ pub enum NoiseSource {
 }
 
 /// 3-D position RMS on held-out poses, m.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gap {
     /// Base and tool fitted only.
     pub nominal_rms_m: f64,
@@ -92,8 +93,25 @@ pub struct Gap {
     pub gap_closed: Option<f64>,
     /// Its 95 % interval, from the folds.
     pub gap_closed_ci95: Option<[f64; 2]>,
+    /// Folds, blocked by region of the workspace.
+    pub folds: usize,
+    /// The same with whole payloads and whole sessions left out, where there are several.
+    pub blocked: Vec<Blocked>,
+}
+
+/// 3-D position RMS on held-out poses in another way of leaving out, m.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Blocked {
+    /// What the rows of a fold share.
+    pub by: Block,
     /// Folds.
     pub folds: usize,
+    /// Base and tool fitted only.
+    pub nominal_rms_m: f64,
+    /// All geometry fitted.
+    pub geometry_rms_m: f64,
+    /// Geometry and what each fold chose.
+    pub explained_rms_m: f64,
 }
 
 /// Where an effect is.

@@ -39,12 +39,11 @@ pub fn weights(squares: &[f64], per_row: usize) -> Vec<f64> {
     squares.iter().map(|square| if *square <= limit { 1.0 } else { (limit / square) * (limit / square) }).collect()
 }
 
-/// The evidence for outliers among readings with these squared residuals. `left`: equations left by the fit, over all.
+/// The evidence for outliers among readings with these squared residuals.
 #[must_use]
-pub fn look(squares: &[f64], per_row: usize, left: f64) -> Outliers {
+pub fn look(squares: &[f64], per_row: usize) -> Outliers {
     let count = per_row as f64;
     let level = level(squares, per_row);
-    let _ = left;
     let density = |square: f64, scale: f64| libm::exp(-0.5 * square / scale) / libm::pow(scale, 0.5 * count);
     let scales: Vec<f64> = (-6..=6).map(|step| level * libm::exp(0.08 * f64::from(step))).collect();
     let total = |share: f64, factor: f64| {

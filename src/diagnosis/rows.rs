@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Translation3, UnitQuaternio
 
 use crate::arm::Arm;
 use crate::effects::signature::posture::{Mechanism, Posture};
+use crate::effects::signature::shape::Displacement;
 use crate::frames::{Pose, rotation_from_vector, rotation_vector};
 use crate::measurement::{Measurement, Sensor};
 
@@ -65,8 +66,10 @@ pub enum DiagnosisError {
 pub struct Rows {
     /// Fitted arm.
     pub mechanism: Mechanism,
-    /// Where it stands.
-    pub measurement_from_root: Pose,
+    /// Where it stands, by session; one for all where they agree.
+    pub measurement_from_root: Vec<Pose>,
+    /// Session of each row, as far as they have bases of their own.
+    pub session: Vec<usize>,
     /// Arm in each row.
     pub postures: Vec<Posture>,
     /// Target in root of each row, m.
@@ -85,6 +88,10 @@ pub struct Rows {
     pub free: Vec<bool>,
     /// Names of the targets.
     pub targets_named: Vec<String>,
+    /// Sum of squares of whitened residuals and of the prior's pull.
+    pub cost: f64,
+    /// What is worth knowing about the sessions.
+    pub notes: Vec<String>,
 }
 
 /// Sigmas of the position (m) and the attitude (rad) of a reading.
@@ -92,11 +99,69 @@ fn sigmas(sensor: &Sensor, position: &Vector3<f64>) -> (f64, f64) {
     (sensor.position_sigma_at(position).max(1e-9), sensor.attitude_sigma_rad.unwrap_or(1.0).max(1e-9))
 }
 
-/// Fits base, target and geometry of `arm` to `measurements`, each weighted by `weights` (1 for a good reading).
+/// Improvement over the noise's mean square, by parameter, from which on sessions have bases of their own (an F value).
+const OWN_BASE: f64 = 6.0;
+
+/// Readings to be fitted.
+#[derive(Clone, Copy)]
+pub struct Readings<'a> {
+    /// The sensor.
+    pub sensor: &'a Sensor,
+    /// What was read.
+    pub measurements: &'a [&'a Measurement],
+    /// Weight of each row: 1 for a good one that stands for itself.
+    pub weights: &'a [f64],
+    /// What effects that are already known do to the target: shift (m) and turn (rad) in root, row by row; empty for nothing.
+    pub displacement: &'a [Displacement],
+}
+
+/// Fits base, target and geometry of `arm` to `readings`. Sessions get bases of their own where that is worth it.
 ///
 /// # Errors
 /// If the measurements cannot tell.
-pub fn fit(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], weights: &[f64]) -> Result<Rows, DiagnosisError> {
+pub fn fit(arm: &Arm, readings: Readings<'_>) -> Result<Rows, DiagnosisError> {
+    let name = |row: &Measurement| row.session.clone().unwrap_or_default();
+    let mut names: Vec<String> = readings.measurements.iter().map(|row| name(row)).collect();
+    names.sort();
+    names.dedup();
+    let together = fit_with(arm, readings, &vec![0; readings.measurements.len()], 1);
+    if names.len() < 2 {
+        return together;
+    }
+    let session: Vec<usize> =
+        readings.measurements.iter().map(|row| names.iter().position(|known| *known == name(row)).unwrap_or(0)).collect();
+    let apart = fit_with(arm, readings, &session, names.len())?;
+    let added = 6.0 * (names.len() - 1) as f64;
+    let left = (apart.residual.len() as f64 - apart.jacobian.ncols() as f64).max(1.0);
+    match together {
+        Ok(together) if (together.cost - apart.cost) / added < OWN_BASE * apart.cost / left => {
+            let notes = vec![format!("the {} sessions share one base: bases of their own would not fit better", names.len())];
+            Ok(Rows { notes, ..together })
+        }
+        _ => {
+            let first = &apart.measurement_from_root[0];
+            let moved: Vec<String> = names[1..]
+                .iter()
+                .zip(&apart.measurement_from_root[1..])
+                .map(|(name, base)| {
+                    let change = first.inverse() * base;
+                    let (shift, turn) = (change.translation.vector.norm(), rotation_vector(&change.rotation).norm());
+                    format!("`{name}` {:.3} mm and {:.3} mrad", shift * 1e3, turn * 1e3)
+                })
+                .collect();
+            let note = format!(
+                "the sessions have bases of their own; against `{}` the base or the sensor has moved in session {}",
+                names[0],
+                moved.join(", ")
+            );
+            Ok(Rows { notes: vec![note], ..apart })
+        }
+    }
+}
+
+/// As [`fit`]; `session` of each row, `bases` of them.
+fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], bases: usize) -> Result<Rows, DiagnosisError> {
+    let Readings { sensor, measurements, weights, displacement } = readings;
     let mut mechanism = Mechanism::new(arm);
     let count = mechanism.joint_count();
     for (row, measurement) in measurements.iter().enumerate() {
@@ -125,7 +190,16 @@ pub fn fit(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], weights: &
 
     let from: Vec<Vector3<f64>> = measurements.iter().map(|row| mechanism.posture(&row.joints, 0.0).tool).collect();
     let to: Vec<Vector3<f64>> = measurements.iter().map(|row| row.position().coords).collect();
-    let mut measurement_from_root = registration(&from, &to).ok_or(DiagnosisError::Degenerate)?;
+    let of_all = registration(&from, &to).ok_or(DiagnosisError::Degenerate)?;
+    let mut measurement_from_root: Vec<Pose> = (0..bases)
+        .map(|base| {
+            let own = |points: &[Vector3<f64>]| -> Vec<Vector3<f64>> {
+                points.iter().zip(session).filter(|(_, of)| **of == base).map(|(point, _)| *point).collect()
+            };
+            let (from, to) = (own(&from), own(&to));
+            if bases == 1 || from.len() < 4 { of_all } else { registration(&from, &to).unwrap_or(of_all) }
+        })
+        .collect();
     if attitude {
         // The first reading of each target tells its attitude well enough to start from.
         for (target, turn) in turns.iter_mut().enumerate() {
@@ -133,16 +207,19 @@ pub fn fit(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], weights: &
                 let posture = mechanism.posture(&measurements[row].joints, 0.0);
                 let tool = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(posture.tool_axes));
                 let measured = measurements[row].attitude().unwrap_or_default();
-                *turn = (measurement_from_root.rotation * tool).inverse() * measured;
+                *turn = (measurement_from_root[session[row]].rotation * tool).inverse() * measured;
             }
         }
     }
 
     let frames = count - 1;
-    let width = 6 + 6 * frames + per_target * targets_named.len();
-    let free: Vec<bool> = (0..width).map(|column| column < 6 || column >= 6 + 6 * frames).collect();
+    // Bases, then frames from that of joint 2 on, then targets.
+    let frame_at = |joint: usize| 6 * bases + 6 * (joint - 1);
+    let target_at = |target: usize| 6 * bases + 6 * frames + per_target * target;
+    let width = target_at(targets_named.len());
+    let free: Vec<bool> = (0..width).map(|column| column < 6 * bases || column >= target_at(0)).collect();
     let prior = |column: usize| {
-        let is_turn = if column < 6 + 6 * frames { column % 6 >= 3 } else { (column - 6 - 6 * frames) % per_target >= 3 };
+        let is_turn = if column < target_at(0) { column % 6 >= 3 } else { (column - target_at(0)) % per_target >= 3 };
         match (free[column], is_turn) {
             (true, false) => FREE_SHIFT,
             (true, true) => FREE_TURN,
@@ -162,13 +239,15 @@ pub fn fit(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], weights: &
         let mut residual = DVector::zeros(equations);
         let mut whitening = DVector::zeros(equations);
         let (mut postures, mut targets) = (Vec::new(), Vec::new());
-        let root_from_measurement = measurement_from_root.inverse();
+        let root_from_measurement: Vec<Pose> = measurement_from_root.iter().map(Pose::inverse).collect();
         for (row, measurement) in measurements.iter().enumerate() {
             let posture = mechanism.posture(&measurement.joints, measurement.payload_kg.unwrap_or(0.0));
             let target = posture.tool + posture.tool_axes * offsets[which[row]];
             let first = row * per_row;
+            let root_from_measurement = &root_from_measurement[session[row]];
+            let [x, y, z, rx, ry, rz] = displacement.get(row).copied().unwrap_or_default();
             let measured = (root_from_measurement * measurement.position()).coords;
-            residual.fixed_rows_mut::<3>(first).copy_from(&(measured - target));
+            residual.fixed_rows_mut::<3>(first).copy_from(&(measured - target - Vector3::new(x, y, z)));
             let (position, turn) = sigmas(sensor, &measurement.position().coords);
             let weight = libm::sqrt(weights[row]);
             for equation in 0..per_row {
@@ -176,7 +255,7 @@ pub fn fit(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], weights: &
             }
             if let (true, Some(measured)) = (attitude, measurement.attitude()) {
                 let tool = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(posture.tool_axes));
-                let predicted = tool * turns[which[row]];
+                let predicted = rotation_from_vector(&Vector3::new(rx, ry, rz)) * tool * turns[which[row]];
                 let difference = rotation_vector(&(root_from_measurement.rotation * measured * predicted.inverse()));
                 residual.fixed_rows_mut::<3>(first + 3).copy_from(&difference);
             }
@@ -195,15 +274,15 @@ pub fn fit(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], weights: &
                     put(column + 3 + axis, direction.cross(&(target - origin)), direction);
                 }
             };
-            frame(0, &Matrix3::identity(), &Vector3::zeros());
+            frame(6 * session[row], &Matrix3::identity(), &Vector3::zeros());
             if !coarse {
                 for joint in 1..count {
                     let moved = &posture.frames[joint - 1];
                     let axes = moved * mechanism.segments[joint].rotation.to_rotation_matrix().into_inner();
-                    frame(6 * joint, &axes, &posture.origins[joint]);
+                    frame(frame_at(joint), &axes, &posture.origins[joint]);
                 }
             }
-            let column = 6 + 6 * frames + per_target * which[row];
+            let column = target_at(which[row]);
             for axis in 0..3 {
                 let direction: Vector3<f64> = posture.tool_axes.column(axis).into();
                 put(column + axis, direction, Vector3::zeros());
@@ -243,6 +322,7 @@ pub fn fit(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], weights: &
             return Ok(Rows {
                 mechanism,
                 measurement_from_root,
+                session: session.to_vec(),
                 postures,
                 targets,
                 per_row,
@@ -252,6 +332,8 @@ pub fn fit(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], weights: &
                 parameters,
                 free,
                 targets_named,
+                cost,
+                notes: Vec::new(),
             });
         }
         damping = if cost > best && step > 8 { (10.0 * damping).max(1e-3) } else { damping / 10.0 };
@@ -267,12 +349,14 @@ pub fn fit(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], weights: &
             let turn = Vector3::from_fn(|axis, _| change[next + axis] * prior[next + axis]);
             Pose::from_parts(Translation3::from(shift), rotation_from_vector(&turn))
         };
-        measurement_from_root *= pose(0);
+        for (base, measurement_from_root) in measurement_from_root.iter_mut().enumerate() {
+            *measurement_from_root *= pose(6 * base);
+        }
         for joint in 1..count {
-            mechanism.segments[joint] *= pose(6 * joint);
+            mechanism.segments[joint] *= pose(frame_at(joint));
         }
         for target in 0..targets_named.len() {
-            let column = 6 + 6 * frames + per_target * target;
+            let column = target_at(target);
             offsets[target] += part(column).0;
             if attitude {
                 let turn = Vector3::from_fn(|axis, _| change[column + 3 + axis] * prior[column + 3 + axis]);

@@ -3,9 +3,10 @@
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::evidence::{SCALES, fit, one_signed};
+use super::held_out::HeldOut;
 use super::outcome::{
-    Candidate, Diagnosis, Effect, Gap, Magnitude, MinimumDetectable, NoiseFloor, NoiseSource, Place, Undetectable, Unknown,
-    Verdict,
+    Blocked, Candidate, Diagnosis, Effect, Gap, Magnitude, MinimumDetectable, NoiseFloor, NoiseSource, Place, Undetectable,
+    Unknown, Verdict,
 };
 use super::power::Bench;
 use super::{Analysis, mean_sigma};
@@ -24,6 +25,19 @@ const STRUCTURED: f64 = 0.003;
 const EXCESS: f64 = 2.4;
 /// Of the kinds and places, so many must be detectable at a realistic magnitude for "no gap".
 const ENOUGH: f64 = 0.5;
+
+/// Held-out RMS in one way of leaving out.
+fn blocked(held_out: &HeldOut) -> Option<Blocked> {
+    let rows: usize = held_out.folds.iter().map(|fold| fold.rows).sum();
+    let rms = |squares: f64| libm::sqrt(squares / rows as f64);
+    (rows > 0).then(|| Blocked {
+        by: held_out.by,
+        folds: held_out.folds.len(),
+        nominal_rms_m: rms(held_out.folds.iter().map(|fold| fold.nominal).sum()),
+        geometry_rms_m: rms(held_out.folds.iter().map(|fold| fold.geometry).sum()),
+        explained_rms_m: rms(held_out.folds.iter().map(|fold| *fold.explained.last().unwrap_or(&fold.geometry)).sum()),
+    })
+}
 
 /// What a hypothesis claims: its kind (or none) and its place.
 type Claim = (Option<Kind>, Location);
@@ -101,6 +115,8 @@ fn magnitude(analysis: &Analysis<'_>, hypothesis: usize) -> Option<Magnitude> {
 pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
     let total = analysis.measurements.len();
     let mut notes = analysis.conditions.notes.clone();
+    notes.extend(analysis.rows.notes.iter().cloned());
+    let folds = analysis.held_out.first().map_or(&[][..], |by_region| &by_region.folds);
     let declared = mean_sigma(analysis.sensor, analysis.measurements);
     let (position_m, source) = match analysis.repeats {
         Some(repeats) => (repeats.position_m, NoiseSource::Repeats),
@@ -108,16 +124,27 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
     };
     let rotation_rad = analysis.sensor.attitude_sigma_rad.filter(|_| analysis.rows.per_row == 6);
     let noise_floor = NoiseFloor { position_m, rotation_rad, source };
+    if analysis.repeats.is_some_and(|repeats| !repeats.moved) {
+        notes.push(
+            "the repeats were read without a move between them: they show the sensor's noise, not what the arm repeats to"
+                .to_owned(),
+        );
+    }
+    if let Some(correlation) = analysis.correlation.filter(|correlation| *correlation > 0.05) {
+        notes.push(format!(
+            "readings of the same configuration are alike (correlation {correlation:.2} of what is left): they are weighted down, n of \
+             them to n / (1 + {correlation:.2} (n − 1))"
+        ));
+    }
     let noise_rms = libm::sqrt(3.0) * position_m;
 
     // Held out.
-    let rows: f64 = analysis.folds.iter().map(|fold| fold.rows as f64).sum::<f64>().max(1.0);
+    let rows: f64 = folds.iter().map(|fold| fold.rows as f64).sum::<f64>().max(1.0);
     let rms = |squares: f64| libm::sqrt(squares / rows);
-    let nominal_rms_m = rms(analysis.folds.iter().map(|fold| fold.nominal).sum());
-    let geometry_rms_m = rms(analysis.folds.iter().map(|fold| fold.geometry).sum());
+    let nominal_rms_m = rms(folds.iter().map(|fold| fold.nominal).sum());
+    let geometry_rms_m = rms(folds.iter().map(|fold| fold.geometry).sum());
     let after = |count: usize| {
-        rms(analysis
-            .folds
+        rms(folds
             .iter()
             .map(|fold| {
                 if count == 0 {
@@ -136,8 +163,7 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
     };
     let gap_closed = closed(geometry_rms_m, explained_rms_m);
     let gap_closed_ci95 = gap_closed.and_then(|_| {
-        let of_folds: Vec<f64> = analysis
-            .folds
+        let of_folds: Vec<f64> = folds
             .iter()
             .filter_map(|fold| {
                 let mean = |squares: f64| libm::sqrt(squares / fold.rows as f64);
@@ -158,7 +184,8 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
         noise_rms_m: noise_rms,
         gap_closed,
         gap_closed_ci95,
-        folds: analysis.folds.len(),
+        folds: folds.len(),
+        blocked: analysis.held_out.iter().skip(1).filter_map(blocked).collect(),
     };
 
     let best = fit(analysis.surviving, analysis.candidates, analysis.noise, &analysis.found.best.members);
@@ -201,12 +228,12 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
             continue;
         }
         let probability = probability(analysis, |other| claim(analysis, other) == this);
-        let chosen = analysis.folds.iter().filter(|fold| fold.chosen.iter().any(|other| claim(analysis, *other) == this)).count();
+        let chosen = folds.iter().filter(|fold| fold.chosen.iter().any(|other| claim(analysis, *other) == this)).count();
         // Beside something unknown a name may only stand in for it: it must be sure, the same whatever is left out, and help more than
         // what has no name.
         let needed = if present { SURE } else { NAMED };
         let before_unknown = analysis.found.best.members[..step].iter().all(|(other, _)| !unknown_members.contains(other));
-        let stable = !present || (before_unknown && 5 * chosen >= 4 * analysis.folds.len());
+        let stable = !present || (before_unknown && 5 * chosen >= 4 * folds.len());
         let Some(magnitude) = magnitude(analysis, *hypothesis).filter(|_| probability >= needed && stable) else {
             continue;
         };
@@ -219,7 +246,7 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
             held_out_rms_before_m: before,
             held_out_rms_after_m: now,
             gap_closed: closed(before, now),
-            folds: [chosen, analysis.folds.len()],
+            folds: [chosen, folds.len()],
             detail: of.detail.clone(),
         });
     }
@@ -236,7 +263,7 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
             held_out_rms_before_m: explained_rms_m,
             held_out_rms_after_m: explained_rms_m,
             gap_closed: None,
-            folds: [0, analysis.folds.len()],
+            folds: [0, folds.len()],
             detail: format!("noise about {} times that of the other readings", outliers.factor),
         });
     }

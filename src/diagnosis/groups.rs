@@ -1,0 +1,248 @@
+//! Readings that are not independent: several targets of one pose, repeats without a move, and the same configuration read again.
+//! What geometry and effects leave there is the arm's, once, and the sensor's, each time.
+
+use nalgebra::Vector3;
+
+use super::conditions::centre;
+use crate::measurement::Measurement;
+
+/// Joint readings that differ by less are of one configuration, rad or m: commanded values come back rounded, or as encoders see them.
+const SAME: f64 = 2e-4;
+/// Temperatures that differ by less are the same, K.
+const SAME_TEMPERATURE: f64 = 0.5;
+/// Squares over one sigma's beyond which one reading in a thousand lies, and their median (χ² with three degrees of freedom).
+const RARE: f64 = 16.27;
+const MEDIAN: f64 = 2.366;
+/// Contrasts that a noise needs.
+const CONTRASTS: usize = 3;
+/// Pairs of alike readings from which their correlation is estimated rather than assumed.
+const PAIRS: f64 = 6.0;
+
+/// Rows of the same configuration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Groups {
+    /// Group of each row, numbered by first appearance.
+    pub of: Vec<usize>,
+    /// Rows of each group.
+    pub rows: Vec<Vec<usize>>,
+}
+
+/// Noise from repeats.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Repeats {
+    /// One sigma per axis, m.
+    pub position_m: f64,
+    /// Degrees of freedom.
+    pub freedom: f64,
+    /// Whether the arm moved between the readings: if not, they show the sensor alone.
+    pub moved: bool,
+}
+
+/// Groups `measurements` by configuration.
+#[must_use]
+pub fn groups(measurements: &[&Measurement]) -> Groups {
+    let total = measurements.len();
+    let mut by_first: Vec<usize> = (0..total).collect();
+    let first = |row: usize| measurements[row].joints.first().copied().unwrap_or(0.0);
+    by_first.sort_by(|a, b| first(*a).total_cmp(&first(*b)).then(a.cmp(b)));
+    let alike = |a: usize, b: usize| {
+        let (a, b) = (&measurements[a].joints, &measurements[b].joints);
+        a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SAME)
+    };
+    // Each row joins the first row that is like it and has no other to join.
+    let mut head: Vec<Option<usize>> = vec![None; total];
+    for (place, row) in by_first.iter().enumerate() {
+        if head[*row].is_some() {
+            continue;
+        }
+        head[*row] = Some(*row);
+        for other in &by_first[place + 1..] {
+            if first(*other) - first(*row) > SAME {
+                break;
+            }
+            if head[*other].is_none() && alike(*row, *other) {
+                head[*other] = Some(*row);
+            }
+        }
+    }
+    let mut heads: Vec<usize> = Vec::new();
+    let mut rows: Vec<Vec<usize>> = Vec::new();
+    let mut of = vec![0; total];
+    for row in 0..total {
+        let head = head[row].unwrap_or(row);
+        let group = heads.iter().rposition(|known| *known == head).unwrap_or_else(|| {
+            heads.push(head);
+            rows.push(Vec::new());
+            heads.len() - 1
+        });
+        of[row] = group;
+        rows[group].push(row);
+    }
+    Groups { of, rows }
+}
+
+/// The noise of readings that should be equal: same configuration, target, session, payload, approach and temperature. Robust: pairs
+/// that disagree by far do not count. Readings between which the arm moved come first; where there are too few, those between which
+/// it did not.
+#[must_use]
+pub fn repeats(measurements: &[&Measurement], groups: &Groups) -> Option<Repeats> {
+    let mut in_time: Vec<usize> = (0..measurements.len()).collect();
+    in_time.sort_by(|a, b| measurements[*a].time_s.total_cmp(&measurements[*b].time_s).then(a.cmp(b)));
+    let mut place = vec![0; measurements.len()];
+    for (at, row) in in_time.iter().enumerate() {
+        place[*row] = at;
+    }
+    let equal = |a: &Measurement, b: &Measurement| {
+        let near = |a: Option<f64>, b: Option<f64>| match (a, b) {
+            (Some(a), Some(b)) => (a - b).abs() <= SAME_TEMPERATURE,
+            (a, b) => a.is_none() && b.is_none(),
+        };
+        a.target == b.target
+            && a.session == b.session
+            && a.payload_kg == b.payload_kg
+            && a.approach == b.approach
+            && near(a.ambient_c, b.ambient_c)
+            && a.temperatures_c.iter().zip(&b.temperatures_c).all(|(a, b)| near(Some(*a), Some(*b)))
+    };
+    let (mut of_visits, mut between) = (Vec::new(), Vec::new());
+    for rows in &groups.rows {
+        let mut left = rows.clone();
+        left.sort_by_key(|row| place[*row]);
+        while let Some(first) = left.first().copied() {
+            let (alike, others): (Vec<usize>, Vec<usize>) =
+                left.iter().partition(|row| equal(measurements[first], measurements[**row]));
+            left = others;
+            // Readings in a row are of one visit.
+            let mut visits: Vec<Vec<usize>> = Vec::new();
+            for row in alike {
+                let visit = visits.last_mut().filter(|visit| {
+                    let last = visit.last().copied().unwrap_or(row);
+                    (place[last] + 1..place[row]).all(|at| groups.of[in_time[at]] == groups.of[row])
+                });
+                match visit {
+                    Some(visit) => visit.push(row),
+                    None => visits.push(vec![row]),
+                }
+            }
+            let point = |row: &usize| measurements[*row].position().coords;
+            for visit in &visits {
+                of_visits.extend(contrasts(&visit.iter().map(point).collect::<Vec<_>>()));
+            }
+            // One reading of each visit, so that the sensor's noise is there once.
+            let firsts: Vec<Vector3<f64>> = visits.iter().filter_map(|visit| visit.first().map(point)).collect();
+            between.extend(contrasts(&firsts));
+        }
+    }
+    let noise = |squares: &[f64], moved: bool| {
+        if squares.len() < CONTRASTS {
+            return None;
+        }
+        let mut sorted = squares.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let level = sorted[sorted.len() / 2] / MEDIAN;
+        let good: Vec<f64> = sorted.into_iter().filter(|square| *square <= RARE * level).collect();
+        let freedom = 3.0 * good.len() as f64;
+        let mean = good.iter().sum::<f64>() / freedom;
+        (mean > 0.0).then(|| Repeats { position_m: libm::sqrt(mean), freedom, moved })
+    };
+    noise(&between, true).or_else(|| noise(&of_visits, false))
+}
+
+/// Squares of orthonormal contrasts (Helmert's) of readings of the same point: each is χ² with three degrees of freedom times the
+/// variance of an axis.
+fn contrasts(points: &[Vector3<f64>]) -> Vec<f64> {
+    (1..points.len())
+        .map(|count| {
+            let before = centre(&points[..count]);
+            (points[count] - before).norm_squared() * count as f64 / (count + 1) as f64
+        })
+        .collect()
+}
+
+/// Weights of rows whose residuals (`per_row` whitened equations each) are alike within a group: a group of `n` rows with the
+/// intraclass correlation ρ tells as much as `n / (1 + (n − 1) ρ)` independent ones. `good`: rows that are no outliers. Also ρ.
+#[must_use]
+pub fn weights(groups: &Groups, residual: &[f64], per_row: usize, good: &[bool]) -> (Vec<f64>, f64) {
+    let of = |row: usize| &residual[row * per_row..(row + 1) * per_row];
+    // Analysis of variance: within groups, and all.
+    let (mut within, mut freedom, mut all, mut count) = (0.0, 0.0, 0.0, 0.0);
+    for rows in &groups.rows {
+        let rows: Vec<usize> = rows.iter().copied().filter(|row| good[*row]).collect();
+        if rows.len() < 2 {
+            continue;
+        }
+        for equation in 0..per_row {
+            let mean = rows.iter().map(|row| of(*row)[equation]).sum::<f64>() / rows.len() as f64;
+            for row in &rows {
+                let value = of(*row)[equation];
+                within += (value - mean) * (value - mean);
+                all += value * value;
+            }
+        }
+        freedom += (rows.len() - 1) as f64;
+        count += rows.len() as f64;
+    }
+    if freedom == 0.0 {
+        return (vec![1.0; groups.of.len()], 0.0);
+    }
+    let correlation =
+        if freedom < PAIRS || all <= 0.0 { 0.5 } else { (1.0 - (within / freedom) / (all / count)).clamp(0.0, 1.0) };
+    let weight = |row: usize| 1.0 / (1.0 + (groups.rows[groups.of[row]].len() - 1) as f64 * correlation);
+    ((0..groups.of.len()).map(weight).collect(), correlation)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::seed::stream;
+
+    fn row(index: usize, joint: f64, x: f64) -> Measurement {
+        Measurement { index, time_s: index as f64, joints: vec![joint, 0.0], position_m: [x, 0.0, 0.0], ..Measurement::default() }
+    }
+
+    #[test]
+    fn repeats_are_recognised_through_rounding_and_outliers() {
+        let mut stream = stream(1, "test/repeats");
+        let mut rows = Vec::new();
+        for index in 0..400 {
+            let mut point = row(index, 0.01 * (index % 40) as f64 + 1e-5 * stream.normal(), 0.0);
+            point.position_m = [0, 1, 2].map(|_| 20e-6 * stream.normal());
+            // A few are two millimetres off, as in a real file.
+            if index % 100 == 7 {
+                point.position_m[0] += 2e-3;
+            }
+            rows.push(point);
+        }
+        let rows: Vec<&Measurement> = rows.iter().collect();
+        let groups = groups(&rows);
+        assert_eq!(groups.rows.len(), 40);
+        let found = repeats(&rows, &groups).unwrap();
+        assert!(found.moved && (found.position_m / 20e-6 - 1.0).abs() < 0.05, "{found:?}");
+        assert!(found.freedom > 950.0);
+    }
+
+    #[test]
+    fn readings_without_a_move_show_the_sensor_alone() {
+        let mut stream = stream(2, "test/repeats");
+        let mut rows: Vec<Measurement> = (0..120).map(|index| row(index, (index / 3) as f64, 0.0)).collect();
+        rows.iter_mut().for_each(|row| row.position_m = [0, 1, 2].map(|_| 1e-5 * stream.normal()));
+        let rows: Vec<&Measurement> = rows.iter().collect();
+        let found = repeats(&rows, &groups(&rows)).unwrap();
+        assert!(!found.moved && (found.position_m / 1e-5 - 1.0).abs() < 0.15, "{found:?}");
+    }
+
+    #[test]
+    fn alike_residuals_count_once_and_independent_ones_each_time() {
+        let rows: Vec<Measurement> = (0..80).map(|index| row(index, (index / 4) as f64, 0.0)).collect();
+        let rows: Vec<&Measurement> = rows.iter().collect();
+        let groups = groups(&rows);
+        let mut stream = stream(3, "test/repeats");
+        let shared: Vec<f64> = (0..20).map(|_| stream.normal()).collect();
+        let alike: Vec<f64> = (0..240).map(|at| shared[at / 12]).collect();
+        let (weights_alike, correlation) = weights(&groups, &alike, 3, &[true; 80]);
+        assert!((correlation - 1.0).abs() < 1e-9 && (weights_alike[0] - 0.25).abs() < 1e-9);
+        let independent: Vec<f64> = (0..240).map(|_| stream.normal()).collect();
+        let (free, correlation) = weights(&groups, &independent, 3, &[true; 80]);
+        assert!(correlation < 0.1 && free[0] > 0.75, "{correlation}");
+    }
+}
