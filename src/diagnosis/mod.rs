@@ -68,6 +68,9 @@ pub(crate) struct Analysis<'a> {
     pub(crate) structure: open_set::Structure,
     pub(crate) outliers: outliers::Outliers,
     pub(crate) maps: Vec<outcome::Map>,
+    pub(crate) residuals: Vec<outcome::Residual>,
+    /// Of each row, which member of the best set moves it most.
+    pub(crate) moved: Vec<Option<usize>>,
     pub(crate) measurements: &'a [&'a Measurement],
     pub(crate) sensor: &'a Sensor,
     pub(crate) repeats: Option<Repeats>,
@@ -159,6 +162,9 @@ pub fn diagnose(
                 })
                 .collect()
         };
+        let moved = moved_most(&problem, &surviving, &candidates, &coefficients, &found.best.members);
+        let geometry_alone = problem.left(&surviving, &DVector::zeros(coefficients.len()));
+        let residuals = residuals(&rows, measurements, &geometry_alone, &residual);
         let structure = open_set::structure(&conditions, &position(true));
         let maps = open_set::maps(&conditions, &position(false));
         let analysis = Analysis {
@@ -172,6 +178,8 @@ pub fn diagnose(
             structure,
             outliers,
             maps,
+            residuals,
+            moved,
             measurements,
             sensor,
             repeats,
@@ -211,6 +219,48 @@ fn coefficients(surviving: &Surviving, candidates: &Candidates, noise: NoisePrio
 fn displaced(problem: &Problem, rows: &Rows, coefficients: &DVector<f64>) -> Vec<Displacement> {
     let made = problem.signatures() * coefficients;
     made.as_slice().chunks(rows.per_row).map(|row| std::array::from_fn(|at| row.get(at).copied().unwrap_or(0.0))).collect()
+}
+
+/// Of each row, which of `members` moves it most beyond what geometry absorbs.
+fn moved_most(
+    problem: &Problem,
+    surviving: &Surviving,
+    candidates: &Candidates,
+    coefficients: &DVector<f64>,
+    members: &[(usize, usize)],
+) -> Vec<Option<usize>> {
+    let seen: Vec<DVector<f64>> = members
+        .iter()
+        .map(|(hypothesis, _)| {
+            let columns = candidates.columns(*hypothesis);
+            let of = coefficients.rows(columns.start, columns.len());
+            let absorbed = surviving.absorbed.columns(columns.start, columns.len()) * of;
+            problem.signatures().columns(columns.start, columns.len()) * of - problem.raw.columns(0, problem.geometry) * absorbed
+        })
+        .collect();
+    (0..problem.raw.nrows() / problem.per_row)
+        .map(|row| {
+            let size = |member: &usize| seen[*member].fixed_rows::<3>(row * problem.per_row).norm_squared();
+            (0..members.len()).max_by(|a, b| size(a).total_cmp(&size(b)))
+        })
+        .collect()
+}
+
+/// What is left of each reading, in the measurement frame.
+fn residuals(rows: &Rows, measurements: &[&Measurement], before: &DVector<f64>, after: &DVector<f64>) -> Vec<outcome::Residual> {
+    (0..measurements.len())
+        .map(|row| {
+            let rotation = rows.measurement_from_root[rows.session[row]].rotation;
+            let part = |of: &DVector<f64>| (rotation * Vector3::from(of.fixed_rows::<3>(row * rows.per_row))).into();
+            outcome::Residual {
+                row: measurements[row].index,
+                position_m: measurements[row].position_m,
+                before_m: part(before),
+                after_m: part(after),
+                cause: None,
+            }
+        })
+        .collect()
 }
 
 /// The residual as it would be without the effects that were taken out before the fit.

@@ -37,6 +37,23 @@ pub struct Diagnosis {
     pub notes: Vec<String>,
     /// Number of readings used.
     pub readings: usize,
+    /// Reading by reading, what is left before and after the causes, and which cause took most of it.
+    pub residuals: Vec<Residual>,
+}
+
+/// What is left of a reading once geometry is fitted to all of them, without the causes and with them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Residual {
+    /// Row of the input, from 0.
+    pub row: usize,
+    /// Measured position in the measurement frame, m.
+    pub position_m: [f64; 3],
+    /// Measured minus predicted by geometry alone, in the measurement frame, m.
+    pub before_m: [f64; 3],
+    /// The same with geometry and all causes (also those without a name) fitted together, m.
+    pub after_m: [f64; 3],
+    /// Position in `effects` of the cause that moves this reading most beyond what geometry absorbs; absent where it is none of them.
+    pub cause: Option<usize>,
 }
 
 /// The answer in one word.

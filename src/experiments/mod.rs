@@ -22,6 +22,8 @@ mod pictures;
 pub mod published;
 pub mod quality;
 pub mod sets;
+#[cfg(test)]
+mod signature_check;
 pub mod situation;
 pub mod statistics;
 pub mod sweep;

@@ -9,6 +9,9 @@ const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 /// Teeth counts (2 N) behind strain-wave errors that are common.
 pub const WAVES_PER_TURN: [f64; 3] = [160.0, 200.0, 240.0];
 
+/// Shares of the load that the friction of a fit may hold in the middle of its play.
+pub const HELD: [f64; 4] = [0.0, 0.02, 0.05, 0.1];
+
 /// Something that may be there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hypothesis {
@@ -93,8 +96,13 @@ pub fn library(mechanism: &Mechanism, columns: &Columns) -> Vec<Hypothesis> {
             all.push(simple(Kind::LinkThermalGrowth, at, Shape::Growth(at), [12e-6, 24e-6]));
             all.push(simple(Kind::JointThermalDrift, at, Shape::Warmth(joint), [3e-6, 30e-6]));
         }
-        all.push(simple(Kind::RadialClearance, at, Shape::ForceAcrossSign(joint), [10e-6, 60e-6]));
-        all.push(simple(Kind::TiltClearance, at, Shape::MomentAcrossSign(joint), [20e-6, 200e-6]));
+        for held in HELD {
+            let detail = if held > 0.0 { format!("friction holds loads below {:.0} %", 100.0 * held) } else { String::new() };
+            let radial = simple(Kind::RadialClearance, at, Shape::ForceAcrossSign { joint, held }, [10e-6, 60e-6]);
+            all.push(Hypothesis { detail: detail.clone(), ..radial });
+            let tilt = simple(Kind::TiltClearance, at, Shape::MomentAcrossSign { joint, held }, [20e-6, 200e-6]);
+            all.push(Hypothesis { detail, ..tilt });
+        }
         nameless(joint, turns, columns, &mut all);
     }
     if columns.temperature {

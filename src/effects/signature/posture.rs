@@ -38,6 +38,8 @@ pub struct Posture {
     pub forces: Vec<Vector3<f64>>,
     /// Moment about each joint's origin that it carries, N·m.
     pub moments: Vec<Vector3<f64>>,
+    /// Length of the segments outboard of each joint, m.
+    pub reaches: Vec<f64>,
 }
 
 impl Mechanism {
@@ -124,11 +126,31 @@ impl Mechanism {
             forces[joint] = force;
             moments[joint] = moment - origins[joint].cross(&force);
         }
-        Posture { axes, frames, origins, tool: origin, tool_axes: rotation, forces, moments }
+        let reaches = (0..count)
+            .map(|joint| self.segments[joint + 1..].iter().map(|segment| segment.translation.vector.norm()).sum())
+            .collect();
+        Posture { axes, frames, origins, tool: origin, tool_axes: rotation, forces, moments, reaches }
     }
 }
 
+/// How well levers are known, m (one sigma): centres of mass, and origins that calibration cannot place along their axes.
+const LEVER_SIGMA: f64 = 2e-3;
+/// How well the direction of gravity is known, rad: the base frame is fitted, its foot need not be level.
+const GRAVITY_SIGMA: f64 = 2e-3;
+
 impl Posture {
+    /// One sigma of a component of the moment at `joint`, N·m: what is not known of levers and of the direction of gravity.
+    #[must_use]
+    pub fn moment_sigma(&self, joint: usize) -> f64 {
+        libm::hypot(LEVER_SIGMA * self.forces[joint].norm(), GRAVITY_SIGMA * self.moments[joint].norm())
+    }
+
+    /// One sigma of a component of the force at `joint`, N.
+    #[must_use]
+    pub fn force_sigma(&self, joint: usize) -> f64 {
+        GRAVITY_SIGMA * self.forces[joint].norm()
+    }
+
     /// Torque about the axis of `joint`, N·m.
     #[must_use]
     pub fn torque(&self, joint: usize) -> f64 {

@@ -28,10 +28,22 @@ pub enum Shape {
     Growth(Option<usize>),
     /// \[1\] A joint turns with the temperature of its link.
     Warmth(usize),
-    /// \[1\] A shift along the force across a joint's axis.
-    ForceAcrossSign(usize),
-    /// \[1\] A turn along the moment across a joint's axis.
-    MomentAcrossSign(usize),
+    /// \[1\] A shift along the force across a joint's axis. Friction of the fit holds what carries less than the share `held` of the
+    /// force in the middle of its play.
+    ForceAcrossSign {
+        /// Joint.
+        joint: usize,
+        /// Share.
+        held: f64,
+    },
+    /// \[1\] A turn along the moment across a joint's axis. Friction of the fit holds what carries less than the share `held` of the
+    /// force times the length of the arm outboard.
+    MomentAcrossSign {
+        /// Joint.
+        joint: usize,
+        /// Share.
+        held: f64,
+    },
     /// \[6\] A twist of the base in proportion to time.
     BaseDrift,
     /// \[6\] A twist of the base from a row on.
@@ -147,9 +159,8 @@ impl Shape {
             Shape::Direction(joint) => vec![reading.moved(joint, 0.5 * reading.approach[joint])],
             Shape::TorqueSign(joint) => {
                 let effort = reading.effort(joint);
-                // Where there is next to no load nothing seats the gear.
-                let sign = if effort.abs() < 1e-6 { 0.0 } else { effort.signum() };
-                vec![reading.moved(joint, 0.5 * sign)]
+                let sigma = if reading.slides[joint] { posture.force_sigma(joint) } else { posture.moment_sigma(joint) };
+                vec![reading.moved(joint, 0.5 * effort / libm::hypot(effort, sigma).max(1e-9))]
             }
             Shape::Harmonic(joint, order) => {
                 let (sine, cosine) = libm::sincos(order * reading.joints[joint]);
@@ -167,10 +178,14 @@ impl Shape {
                 vec![twist(shift, Vector3::zeros())]
             }
             Shape::Warmth(joint) => vec![reading.moved(joint, reading.rise_k[joint])],
-            Shape::ForceAcrossSign(joint) => {
-                vec![twist(unit(posture.force_across(joint)), Vector3::zeros())]
+            Shape::ForceAcrossSign { joint, held } => {
+                let (load, sigma) = (posture.force_across(joint), posture.force_sigma(joint));
+                vec![twist(seated(load, sigma, held * posture.forces[joint].norm()), Vector3::zeros())]
             }
-            Shape::MomentAcrossSign(joint) => vec![reading.turned(joint, unit(posture.moment_across(joint)))],
+            Shape::MomentAcrossSign { joint, held } => {
+                let (load, sigma) = (posture.moment_across(joint), posture.moment_sigma(joint));
+                vec![reading.turned(joint, seated(load, sigma, held * posture.forces[joint].norm() * posture.reaches[joint]))]
+            }
             Shape::BaseDrift => base_twist(reading, reading.share),
             Shape::BaseStep(row) => base_twist(reading, f64::from(u8::from(reading.order >= row))),
             Shape::ToolStep(row) => tool_twist(reading, f64::from(u8::from(reading.order >= row)), attitude),
@@ -258,8 +273,14 @@ impl Shape {
     }
 }
 
-fn unit(vector: Vector3<f64>) -> Vector3<f64> {
-    vector.try_normalize(1e-9).unwrap_or_else(Vector3::zeros)
+/// The direction of a load that seats something, as far as it is known: shorter than one where the load is as small as the `sigma` of
+/// its components, so that a reading whose side nobody knows says little, and zero where friction up to `friction` holds.
+fn seated(load: Vector3<f64>, sigma: f64, friction: f64) -> Vector3<f64> {
+    let size = load.norm();
+    // No fit's friction is known to better than some hundredths; neither is the load.
+    let edge = libm::hypot(sigma, 0.15 * friction).max(1e-9);
+    let free = if friction > 0.0 { (0.5 + 0.5 * (size - friction) / edge).clamp(0.0, 1.0) } else { 1.0 };
+    load * free / libm::hypot(size, sigma).max(1e-9)
 }
 
 fn base_twist(reading: &Reading, factor: f64) -> Vec<Displacement> {
