@@ -26,6 +26,16 @@ pub fn power(report: &Report) -> String {
         let dash = || "–".to_owned();
         let named: Vec<String> =
             curve.levels.iter().map(|level| format!("{:.0}", 100.0 * level.named as f64 / level.trials.max(1) as f64)).collect();
+        // What is named in its place, most often first.
+        let mut instead: Vec<(&String, usize)> = Vec::new();
+        for (name, count) in curve.levels.iter().flat_map(|level| &level.wrong) {
+            match instead.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, sum)) => *sum += count,
+                None => instead.push((name, *count)),
+            }
+        }
+        instead.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(b.0)));
+        let words: Vec<String> = instead.iter().take(2).map(|(name, count)| format!("{count} {name}")).collect();
         vec![
             curve.kind.name().to_owned(),
             place(curve),
@@ -34,9 +44,11 @@ pub fn power(report: &Report) -> String {
             curve.measured.map_or_else(dash, |measured| number(measured / factor) + &range(curve.interval95, factor)),
             curve.ratio().map_or_else(dash, |ratio| format!("{ratio:.2}")),
             if named.is_empty() { dash() } else { named.join(" ") },
+            if words.is_empty() { dash() } else { words.join(", ") },
         ]
     });
-    let header = ["kind", "at", "unit", "stated (80 % of sets)", "measured (95 %)", "measured / stated", "named (%)"];
+    let header =
+        ["kind", "at", "unit", "stated (80 % of sets)", "measured (95 %)", "measured / stated", "named (%)", "named besides"];
     let mut text = table(&header, rows.collect());
     let levels: Vec<String> = report.curves.iter().find(|curve| !curve.levels.is_empty()).map_or_else(Vec::new, |curve| {
         let stated = curve.stated.unwrap_or(1.0);

@@ -1,6 +1,8 @@
 //! Whether the minimum detectable magnitudes that a diagnosis states are true: cells with effects about that size, through the whole
 //! simulation and the whole analyser, and how often the effect is named.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -86,7 +88,7 @@ impl Curve {
 }
 
 /// A magnitude and how often it is named.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Level {
     /// SI.
     pub magnitude: f64,
@@ -94,8 +96,8 @@ pub struct Level {
     pub trials: usize,
     /// Right kind at the right place.
     pub named: usize,
-    /// Another kind or place named.
-    pub wrong: usize,
+    /// Another kind or place named: which, and how often.
+    pub wrong: BTreeMap<String, usize>,
     /// Called unknown.
     pub unknown: usize,
 }
@@ -132,7 +134,7 @@ pub fn check(base: &SceneFile, options: &Options, watcher: &dyn Watcher) -> Resu
         })
         .collect();
     watcher.begin("with effects", jobs.len());
-    let seen: Vec<[bool; 3]> = jobs
+    let seen: Vec<Judged> = jobs
         .par_iter()
         .map(|(curve, level, trial)| {
             let curve = &curves[*curve];
@@ -146,17 +148,19 @@ pub fn check(base: &SceneFile, options: &Options, watcher: &dyn Watcher) -> Resu
             Ok(judged(&found, curve))
         })
         .collect::<Result<_, ChallengeError>>()?;
-    for ((curve, level, _), [named, wrong, unknown]) in jobs.iter().zip(seen) {
+    for ((curve, level, _), judged) in jobs.iter().zip(seen) {
         let curve = &mut curves[*curve];
         let magnitude = curve.stated.unwrap_or(0.0) * options.levels[*level];
         if curve.levels.len() <= *level {
-            curve.levels.push(Level { magnitude, trials: 0, named: 0, wrong: 0, unknown: 0 });
+            curve.levels.push(Level { magnitude, trials: 0, named: 0, wrong: BTreeMap::new(), unknown: 0 });
         }
         let level = &mut curve.levels[*level];
         level.trials += 1;
-        level.named += usize::from(named);
-        level.wrong += usize::from(wrong);
-        level.unknown += usize::from(unknown);
+        level.named += usize::from(judged.named);
+        level.unknown += usize::from(judged.unknown);
+        for name in judged.wrong {
+            *level.wrong.entry(name).or_default() += 1;
+        }
     }
     for curve in &mut curves {
         let Some(stated) = curve.stated else { continue };
@@ -241,14 +245,28 @@ fn stated(kind: Kind, place: Option<usize>, quiet: &[Diagnosis]) -> Option<Curve
     })
 }
 
-/// Whether the effect is named, whether something else is, and whether something is called unknown.
-fn judged(found: &Diagnosis, curve: &Curve) -> [bool; 3] {
+/// Whether the effect is named, what else is, and whether something is called unknown.
+struct Judged {
+    named: bool,
+    wrong: Vec<String>,
+    unknown: bool,
+}
+
+fn judged(found: &Diagnosis, curve: &Curve) -> Judged {
     let is = |effect: &crate::diagnosis::outcome::Effect| {
         effect.kind == curve.kind.name()
             && (effect.location.level, effect.location.index) == (curve.location.level, curve.location.index)
     };
-    let mut named = found.effects.iter().filter(|effect| effect.probability >= NAMED);
-    [named.clone().any(is), named.any(|effect| !is(effect)), found.unknown.present]
+    let named = || found.effects.iter().filter(|effect| effect.probability >= NAMED);
+    let name = |effect: &crate::diagnosis::outcome::Effect| match effect.location.index {
+        Some(index) => format!("{} {index}", effect.kind),
+        None => effect.kind.clone(),
+    };
+    Judged {
+        named: named().any(is),
+        wrong: named().filter(|effect| !is(effect)).map(name).collect(),
+        unknown: found.unknown.present,
+    }
 }
 
 /// The logistic curve of largest likelihood through (x, hits, trials), and where it reaches `share`, with the interval of the delta
