@@ -69,9 +69,13 @@ pub(crate) enum Command {
     Identify(IdentifyOptions),
     /// Say which un-modelled effect causes what calibration leaves, where, and with what probability
     #[command(after_help = "Examples:\n  kincal diagnose recordings/arm8-measure.mcap\n  \
-        kincal diagnose grid.csv --robot ur5.urdf --position-noise-um 25 --json\n\n\
+        kincal diagnose grid.csv --robot ur5.urdf --position-noise-um 25 --json\n  \
+        kincal diagnose recordings/arm8-measure.mcap --confirm       what is named, again from the physics\n\n\
         Besides the columns of `kincal identify` a table may have approach1… (-1, 0, 1), temp_ambient_c, payload_kg, dwell_s,\n\
-        session and target. What is missing switches off what needs it. Exit code 1: there is a gap that is not explained.")]
+        session and target. What is missing switches off what needs it. Exit code 1: there is a gap that is not explained, or\n\
+        --confirm finds that the physics disagrees: it moves the target otherwise than the formulas of first order (by more than 5 %\n\
+        and more than a fifth of the noise floor), its held-out RMS differs from theirs by more than that, or stays above the\n\
+        diagnosis' own by more than half of it.")]
     Diagnose(DiagnoseOptions),
     /// Recompute a recording and compare bit for bit
     #[command(after_help = "Examples:\n  kincal replay recordings/arm8.mcap\n  \
@@ -299,6 +303,9 @@ pub(crate) struct DiagnoseOptions {
     /// Kinds of effects that are not to be looked for
     #[arg(long, value_name = "KIND", value_delimiter = ',')]
     pub(crate) without: Vec<String>,
+    /// Simulate the effects that are named on the same poses, and compare what they do and what is left
+    #[arg(long)]
+    pub(crate) confirm: bool,
     /// Use a recording that was cut off, up to the cut
     #[arg(long)]
     pub(crate) partial: bool,

@@ -9,6 +9,7 @@ use crate::arm::Arm;
 use crate::diagnosis::outcome::{NoiseSource, Verdict};
 use crate::diagnosis::{self, Options};
 use crate::effects::Kind;
+use crate::experiments::confirm::{Answer, confirm};
 use crate::measurement::{Measurement, Sensor, table};
 use crate::{report, scene, session};
 
@@ -27,8 +28,22 @@ pub(crate) fn command(global: &Global, options: &DiagnoseOptions) -> anyhow::Res
     let mut diagnosis = diagnosis::diagnose(&subject.arm, &subject.sensor, &rows, &options_of_diagnosis)
         .with_context(|| options.input.display().to_string())?;
     diagnosis.notes.extend(subject.notes);
+    let confirmation = if options.confirm {
+        let confirmation = confirm(&diagnosis, &subject.arm, &subject.sensor, &rows);
+        Some(confirmation.with_context(|| options.input.display().to_string())?)
+    } else {
+        None
+    };
+    let mut json = serde_json::to_value(&diagnosis)?;
     output::show(global, &report::diagnosis::text(&diagnosis))?;
-    output::show_json(global, &serde_json::to_value(&diagnosis)?)?;
+    if let Some(confirmation) = &confirmation {
+        output::show(global, &report::confirm::text(confirmation))?;
+        json["confirmation"] = serde_json::to_value(confirmation)?;
+    }
+    output::show_json(global, &json)?;
+    if confirmation.is_some_and(|confirmation| confirmation.verdict == Answer::Disagrees) {
+        return Ok(Outcome::Bad);
+    }
     // A gap that nobody can explain is a bad answer; that nothing could be seen is none at all.
     Ok(match diagnosis.verdict {
         Verdict::NoGap | Verdict::Explained => Outcome::Good,

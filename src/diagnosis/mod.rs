@@ -12,12 +12,14 @@ pub mod held_out;
 pub mod open_set;
 pub mod outcome;
 pub mod outliers;
+mod parameters;
 pub mod power;
 pub mod rows;
 pub mod search;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod verdict;
+pub mod waterfall;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 

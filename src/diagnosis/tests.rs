@@ -180,7 +180,7 @@ fn a_fold_less_is_a_subtraction() {
 }
 
 /// Checks what the schema of this program uses of JSON Schema: types, enums, required, items, bounds, references, anyOf.
-fn check(root: &Value, schema: &Value, value: &Value, path: &str) -> Result<(), String> {
+pub(crate) fn check(root: &Value, schema: &Value, value: &Value, path: &str) -> Result<(), String> {
     let wrong = |what: &str| Err(format!("{path}: {what}: {value}"));
     if let Some(reference) = schema["$ref"].as_str() {
         return check(root, root.pointer(reference.trim_start_matches('#')).ok_or("no such reference")?, value, path);

@@ -5,9 +5,10 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::evidence::{SCALES, fit, one_signed};
 use super::held_out::HeldOut;
 use super::outcome::{
-    Blocked, Candidate, Diagnosis, Effect, Gap, Magnitude, MinimumDetectable, NoiseFloor, NoiseSource, Place, Residual,
-    Undetectable, Unknown, Verdict,
+    Blocked, Candidate, Diagnosis, Effect, Gap, Magnitude, MinimumDetectable, NoiseFloor, NoiseSource, Parameters, Place,
+    Residual, Undetectable, Unknown, Verdict,
 };
+use super::parameters::parameters;
 use super::power::Bench;
 use super::{Analysis, mean_sigma};
 use crate::effects::signature::shape::Shape;
@@ -277,6 +278,7 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
             location: place(analysis, *hypothesis),
             probability,
             magnitude,
+            parameters: parameters(analysis, *hypothesis),
             held_out_rms_before_m: before,
             held_out_rms_after_m: now,
             gap_closed: closed(before, now),
@@ -294,6 +296,7 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
             location: Place { level: Level::Sensor, index: None, time_s: None },
             probability: outliers.probability,
             magnitude: Magnitude { value: outliers.share, unit: "1".to_owned(), ci95: outliers.share_ci95 },
+            parameters: Parameters { factor: Some(outliers.factor), ..Parameters::default() },
             held_out_rms_before_m: explained_rms_m,
             held_out_rms_after_m: explained_rms_m,
             gap_closed: None,

@@ -291,7 +291,8 @@ fn of_arm(arm: &Arm, case: &Case, planned: &[Planned]) -> Result<Line, Validatio
     Ok(all.line(case, settled as f64 / start.elapsed().as_secs_f64()))
 }
 
-fn undecided(settled: &Settled) -> bool {
+/// Whether friction holds some play where the load does not decide.
+pub(crate) fn undecided(settled: &Settled) -> bool {
     settled.seats.iter().any(|seat| [seat.radial_by, seat.axial_by, seat.tilt_by].contains(&SeatedBy::Friction))
         || settled.yields.iter().any(|of| of.effect == "gravity_lost_motion" && of.by == SeatedBy::Friction)
 }

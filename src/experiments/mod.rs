@@ -8,6 +8,7 @@ pub mod bake_off;
 pub mod bench;
 pub mod challenge;
 pub mod conditions;
+pub mod confirm;
 pub mod count_error;
 pub mod count_index;
 pub mod detectability;

@@ -119,7 +119,8 @@ fn shown(unit: &str) -> (&str, f64) {
     }
 }
 
-fn place(place: &Place) -> String {
+/// A place in words.
+pub(super) fn place(place: &Place) -> String {
     let level = match place.level {
         Level::Joint => "joint",
         Level::Link => "link",

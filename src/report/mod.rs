@@ -1,6 +1,7 @@
 //! Results as tables and figures for people. Units are in the headers; machines get the same results as JSON.
 
 pub mod challenge;
+pub mod confirm;
 pub mod diagnosis;
 pub mod effects;
 pub mod findings;
@@ -225,6 +226,11 @@ pub fn combinations(identification: &Identification) -> String {
         })
         .collect();
     table(&["identifiable combination", "unit", "change", "standard error", "95 % from", "to"], rows)
+}
+
+/// A length in micrometres, without its unit; what is below a nanometre is only said to be.
+pub(crate) fn micrometres(metres: f64) -> String {
+    if metres > 0.0 && metres < 1e-9 { "< 0.001".to_owned() } else { number(metres * 1e6) }
 }
 
 /// Four significant digits, in plain notation where that is readable.

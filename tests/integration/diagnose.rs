@@ -81,3 +81,53 @@ fn the_report_begins_with_the_verdict_and_bad_input_is_refused() {
     fs::write(&table, "q1_rad,x_m,y_m,z_m\n0,1,0,0\n").unwrap();
     assert!(refused(&[table.to_str().unwrap()]).contains("give its nominal robot with --robot"));
 }
+
+/// Backlash of 120″ in joint 3 of the session of `scenes/gap.toml`: named, simulated, confirmed; from a table, too, with a robot that has
+/// no masses.
+#[test]
+fn what_is_named_is_confirmed_by_the_physics() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = "scenes/gap.toml";
+    let settings = [
+        "injected.effect=[{kind=\"backlash\",joint=\"joint3\",width_arcsec=120}]",
+        "design.method=random",
+        "design.count=50",
+        "plan.held_out_count=10",
+        "plan.repeats=1",
+    ];
+    let run: Vec<&str> = ["run", scene].into_iter().chain(settings.iter().flat_map(|setting| ["--set", setting])).collect();
+    kincal(folder.path(), &run).ends(0);
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let recording = path("gap.mcap");
+    let plain = kincal(folder.path(), &["diagnose", &recording, "--json"]).ends(0).json();
+    assert!(plain.get("confirmation").is_none());
+    let ran = kincal(folder.path(), &["diagnose", &recording, "--confirm", "--json"]).ends(0);
+    assert_eq!(kincal(folder.path(), &["diagnose", &recording, "--confirm", "--json", "--threads", "1"]).stdout, ran.stdout);
+    let agrees = |json: &Value, noise: f64| {
+        let confirmation = &json["confirmation"];
+        assert_eq!(confirmation["verdict"], "confirmed", "{confirmation}");
+        let steps = confirmation["steps"].as_array().unwrap();
+        assert_eq!((steps.len(), &steps[0]["kind"], &steps[0]["location"]["index"]), (1, &"backlash".into(), &3.into()));
+        let number = |key: &str| steps[0][key].as_f64().unwrap();
+        assert!((number("physics_rms_m") - number("analytic_rms_m")).abs() < 0.01 * noise);
+        assert!((number("physics_rms_m") - number("diagnosed_rms_m")).abs() < 0.2 * noise);
+        assert!(number("physics_rms_m") < 0.6 * confirmation["geometry_rms_m"].as_f64().unwrap());
+        assert!(number("displacement_rms_m") > 50e-6 && number("difference_max_m") < 0.1e-6);
+    };
+    let json = ran.json();
+    agrees(&json, json["gap"]["noise_rms_m"].as_f64().unwrap());
+    let report = kincal(folder.path(), &["diagnose", &recording, "--confirm"]).ends(0).stdout;
+    assert!(report.contains("The physics confirms it") && report.contains("+ backlash joint 3"), "{report}");
+
+    kincal(folder.path(), &["export", &recording, "--to", "csv"]).ends(0);
+    kincal(folder.path(), &["export", scene, "--to", "urdf"]).ends(0);
+    let urdf = fs::read_to_string(path("gap.urdf")).unwrap();
+    let parts: Vec<&str> = urdf.split("<inertial>").collect();
+    assert!(parts.len() > 8);
+    let rest = parts[1..].iter().map(|part| part.split_once("</inertial>").unwrap().1);
+    fs::write(path("bare.urdf"), parts[..1].iter().copied().chain(rest).collect::<String>()).unwrap();
+    let arguments =
+        ["diagnose", &path("gap.csv"), "--robot", &path("bare.urdf"), "--position-noise-um", "30", "--confirm", "--json"];
+    let json = kincal(folder.path(), &arguments).json();
+    agrees(&json, json["gap"]["noise_rms_m"].as_f64().unwrap());
+}

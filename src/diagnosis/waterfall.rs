@@ -1,0 +1,163 @@
+//! What named effects are worth on held-out poses, once what they do to each reading is known: by the formulas of first order
+//! ([`Waterfall::displacements`]), or told by somebody else, such as a simulation.
+
+use super::conditions::{self, Conditions};
+use super::groups::{self, groups};
+use super::held_out::{self, Scheme};
+use super::outcome::Effect;
+use super::outliers;
+use super::rows::{self, DiagnosisError, Readings, Rows};
+use crate::arm::Arm;
+use crate::effects::Kind;
+use crate::effects::signature::shape::{Displacement, Shape};
+use crate::measurement::{Measurement, Sensor};
+
+/// Rounds of fitting geometry beside the effects, and of weighting readings.
+const PASSES: usize = 4;
+
+/// Readings with the folds of their diagnosis and the weights that they have beside the effects named: the same for every step of a
+/// waterfall.
+#[derive(Clone, Debug)]
+pub struct Waterfall<'a> {
+    arm: &'a Arm,
+    sensor: &'a Sensor,
+    measurements: &'a [&'a Measurement],
+    /// Geometry fitted beside the effects.
+    pub rows: Rows,
+    /// Readings as signatures see them.
+    pub conditions: Conditions,
+    scheme: Scheme,
+    weights: Vec<f64>,
+    good: Vec<bool>,
+}
+
+impl<'a> Waterfall<'a> {
+    /// Of `measurements` of `arm`, read by `sensor`, in which `effects` were found. Readings that are far off beside them are weighted
+    /// down and do not count where they are held out, and those that repeat others count as much as they tell, as in a diagnosis.
+    ///
+    /// # Errors
+    /// If the measurements cannot tell where the arm stands, or are not this robot's.
+    pub fn new(
+        arm: &'a Arm,
+        sensor: &'a Sensor,
+        measurements: &'a [&'a Measurement],
+        effects: &[Effect],
+    ) -> Result<Self, DiagnosisError> {
+        let total = measurements.len();
+        let groups = groups(measurements);
+        let start = vec![1.0; total];
+        let rows = rows::fit(arm, Readings { sensor, measurements, weights: &start, displacement: &[] })?;
+        let conditions = conditions::conditions(measurements, &rows);
+        let scheme = held_out::schemes(measurements, &rows.targets, &groups).swap_remove(0);
+        let good = vec![true; total];
+        let mut waterfall = Waterfall { arm, sensor, measurements, rows, conditions, scheme, weights: start, good };
+        for _ in 0..PASSES {
+            let displacement = waterfall.all(effects);
+            let weights = &waterfall.weights;
+            let rows = rows::fit(arm, Readings { sensor, measurements, weights, displacement: &displacement })?;
+            // In declared sigmas, whatever a row's weight.
+            let sigmas: Vec<f64> = (0..rows.residual.len())
+                .map(|equation| rows.residual[equation] * rows.whitening[equation] / libm::sqrt(weights[equation / rows.per_row]))
+                .collect();
+            let squares: Vec<f64> =
+                sigmas.chunks(rows.per_row).map(|row| row.iter().map(|value| value * value).sum::<f64>()).collect();
+            let far = outliers::weights(&squares, rows.per_row);
+            let near: Vec<bool> = far.iter().map(|weight| *weight > 0.5).collect();
+            let (dependent, _) = groups::weights(&groups, &sigmas, rows.per_row, &near);
+            let outliers = outliers::look(&squares, rows.per_row).rows;
+            waterfall.good = (0..total).map(|row| !outliers.contains(&row)).collect();
+            waterfall.weights = far.iter().zip(&dependent).map(|(a, b)| a * b).collect();
+            waterfall.conditions = conditions::conditions(measurements, &rows);
+            waterfall.rows = rows;
+        }
+        Ok(waterfall)
+    }
+
+    /// What all of `effects` that have a formula do together.
+    fn all(&self, effects: &[Effect]) -> Vec<Displacement> {
+        let nothing = vec![[0.0; 6]; self.measurements.len()];
+        effects
+            .iter()
+            .filter_map(|effect| self.displacements(effect))
+            .fold(nothing, |sum, one| sum.iter().zip(&one).map(|(a, b)| std::array::from_fn(|axis| a[axis] + b[axis])).collect())
+    }
+
+    /// What `effect` does to the target in each reading (shift in m, turn in rad, in root), to first order; `None` where there is no
+    /// formula for it, or where the readings lack what it needs.
+    #[must_use]
+    pub fn displacements(&self, effect: &Effect) -> Option<Vec<Displacement>> {
+        let (shape, values) = formula(effect, self.rows.mechanism.joint_count())?;
+        let attitude = self.rows.per_row == 6;
+        let known = |joint: usize, values: &[f64]| joint < values.len();
+        self.conditions
+            .readings
+            .iter()
+            .map(|reading| {
+                match shape {
+                    Shape::Direction(joint) if !known(joint, &reading.approach) => return None,
+                    Shape::Warmth(_) | Shape::Growth(_) if reading.rise_k.is_empty() => return None,
+                    _ => {}
+                }
+                let columns = shape.columns(reading, attitude);
+                Some(std::array::from_fn(|axis| columns.iter().zip(&values).map(|(column, value)| column[axis] * value).sum()))
+            })
+            .collect()
+    }
+
+    /// 3-D position RMS on held-out poses, m, of base, target and geometry fitted to what the readings are without `displacements`
+    /// (of each reading: shift of the target in m, turn in rad, in root).
+    ///
+    /// # Errors
+    /// If what remains is not this robot's.
+    pub fn after(&self, displacements: &[Displacement]) -> Result<f64, DiagnosisError> {
+        use rayon::prelude::*;
+        let (sensor, measurements) = (self.sensor, self.measurements);
+        let squares: Vec<(f64, usize)> = (0..self.scheme.folds)
+            .into_par_iter()
+            .map(|number| {
+                let held = |row: &usize| self.scheme.fold[*row] == number;
+                // What weighs nothing has no part in the fit, and its residual is the prediction's error.
+                let weights: Vec<f64> =
+                    (0..measurements.len()).map(|row| if held(&row) { 0.0 } else { self.weights[row] }).collect();
+                let fitted =
+                    rows::fit(self.arm, Readings { sensor, measurements, weights: &weights, displacement: displacements })?;
+                let counted: Vec<usize> = (0..measurements.len()).filter(|row| held(row) && self.good[*row]).collect();
+                let square = |row: &usize| fitted.residual.fixed_rows::<3>(row * fitted.per_row).norm_squared();
+                Ok((counted.iter().map(square).sum::<f64>(), counted.len()))
+            })
+            .collect::<Result<_, DiagnosisError>>()?;
+        let (sum, count) = squares.iter().fold((0.0, 0), |(sum, count), one| (sum + one.0, count + one.1));
+        Ok(libm::sqrt(sum / count.max(1) as f64))
+    }
+}
+
+/// What an effect follows, and the coefficients of its columns.
+fn formula(effect: &Effect, joints: usize) -> Option<(Shape, Vec<f64>)> {
+    let (parameters, size) = (&effect.parameters, effect.magnitude.value);
+    // Joints and links count from 0 in here.
+    let index = effect.location.index.and_then(|index| index.checked_sub(1)).filter(|index| *index < joints);
+    let twist = || Some([parameters.translation_m?, parameters.rotation_rad?].concat());
+    Some(match Kind::from_name(&effect.kind)? {
+        Kind::JointCompliance => (Shape::Torque(index?), vec![size]),
+        Kind::LinkBending => (Shape::MomentAcross(index?), vec![size]),
+        Kind::Backlash => (Shape::Direction(index?), vec![size * parameters.sign?]),
+        Kind::GravityLostMotion => (Shape::TorqueSign(index?), vec![size]),
+        Kind::JointEccentricity | Kind::StrainWaveError => {
+            let (sine, cosine) = libm::sincos(parameters.phase_rad?);
+            (Shape::Harmonic(index?, parameters.order?), vec![size * cosine, -size * sine])
+        }
+        Kind::GearCoupling => {
+            let source = parameters.source?.checked_sub(1).filter(|source| *source < joints)?;
+            (Shape::Ratio { joint: index?, source }, vec![size])
+        }
+        Kind::LinkThermalGrowth => (Shape::Growth(index), vec![size]),
+        Kind::JointThermalDrift => (Shape::Warmth(index?), vec![size]),
+        Kind::RadialClearance => (Shape::ForceAcrossSign { joint: index?, held: parameters.held? }, vec![size]),
+        Kind::TiltClearance => (Shape::MomentAcrossSign { joint: index?, held: parameters.held? }, vec![size]),
+        Kind::BaseDrift => (Shape::BaseDrift, twist()?),
+        Kind::BaseStep => (Shape::BaseStep(parameters.row?), twist()?),
+        Kind::ToolStep => (Shape::ToolStep(parameters.row?), twist()?),
+        Kind::MeasurementScale => (Shape::Scale, vec![size]),
+        Kind::MeasurementOutliers => return None,
+    })
+}
