@@ -48,6 +48,28 @@ pub fn rotation_from_vector(vector: &Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::new_normalize(nalgebra::Quaternion::from_parts(cosine, vector * factor))
 }
 
+/// The pose `to_from_from` that brings the points `from` (m) nearest to the points `to` in the least-squares sense (Kabsch 1976); `None` where
+/// the points lie on a line.
+#[must_use]
+pub fn registration(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Pose> {
+    let count = from.len() as f64;
+    let (from_centre, to_centre) = (from.iter().sum::<Vector3<f64>>() / count, to.iter().sum::<Vector3<f64>>() / count);
+    let covariance: Matrix3<f64> =
+        from.iter().zip(to).map(|(from, to)| (to - to_centre) * (from - from_centre).transpose()).sum();
+    let svd = covariance.svd(true, true);
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    let mut values: Vec<f64> = svd.singular_values.iter().copied().collect();
+    values.sort_by(|a, b| b.total_cmp(a));
+    if values[1] <= values[0] * 1e-9 || !values[0].is_finite() || values[0] < 1e-12 {
+        return None;
+    }
+    let mut signs = Matrix3::identity();
+    let smallest = svd.singular_values.imin();
+    signs[(smallest, smallest)] = (u * v_t).determinant().signum();
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(u * signs * v_t));
+    Some(Pose::from_parts(Translation3::from(to_centre - rotation * from_centre), rotation))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -9,6 +9,7 @@ pub mod evidence;
 pub mod gram;
 pub mod groups;
 pub mod held_out;
+pub mod mistake;
 pub mod open_set;
 pub mod outcome;
 pub mod outliers;
@@ -39,7 +40,7 @@ use rows::{DiagnosisError, Readings, Rows};
 /// Folds of the cross-validation.
 pub const FOLDS: usize = 5;
 /// Prior odds of one effect more.
-const ODDS: f64 = 0.5;
+const ODDS: f64 = 1.0;
 /// Rounds of fitting around what was found.
 const PASSES: usize = 5;
 /// Share of the prior of shapes without a name.
@@ -322,6 +323,7 @@ fn class(hypothesis: &Hypothesis) -> (Option<Kind>, u8) {
         Shape::Memory(..) => 7,
         Shape::AllYield => 8,
         Shape::AngleCurve(_) => 10,
+        Shape::AngleMap { .. } => 11,
         _ => 9,
     };
     (hypothesis.kind, shape)

@@ -5,10 +5,11 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
+use super::mistake;
 use crate::arm::Arm;
 use crate::effects::signature::posture::{Mechanism, Posture};
 use crate::effects::signature::shape::Displacement;
-use crate::frames::{Pose, rotation_from_vector, rotation_vector};
+use crate::frames::{Pose, registration, rotation_from_vector, rotation_vector};
 use crate::measurement::{Measurement, Sensor};
 
 /// One sigma of a joint frame's position, m: machining and assembly are better than this.
@@ -18,6 +19,8 @@ const FRAME_TURN: f64 = 10e-3;
 /// Base and target are free: so wide, about where the fit finds them, that it never binds.
 const FREE_SHIFT: f64 = 50e-3;
 const FREE_TURN: f64 = 50e-3;
+/// Fitted errors of a frame over their prior's sigma beyond which it is another robot, or its readings are wrong.
+const IMPLAUSIBLE: f64 = 12.0;
 /// Steps of the fit.
 const STEPS: usize = 30;
 
@@ -41,13 +44,25 @@ pub enum DiagnosisError {
     )]
     Degenerate,
     /// The fit went astray.
-    #[error(
-        "no arm of this kind makes these readings: with base, target and geometry fitted, {rms_mm:.0} mm RMS remain; are the units \
-         right, are joints swapped or frozen, and is it this robot?"
-    )]
+    #[error("no arm of this kind makes these readings: with base, target and geometry fitted, {rms_mm:.0} mm RMS remain. {hint}")]
     NotThisRobot {
         /// Remaining, mm.
         rms_mm: f64,
+        /// What would fit, if anything simple does.
+        hint: String,
+    },
+    /// The fit bent the arm out of shape.
+    #[error(
+        "these readings fit only an arm whose frames are up to {shift_mm:.0} mm and {turn_deg:.1}° off its nominal model, which no arm of \
+         this kind is. {hint}"
+    )]
+    NotThisGeometry {
+        /// Largest shift of a frame along an axis, mm.
+        shift_mm: f64,
+        /// Largest turn of a frame about an axis, degrees.
+        turn_deg: f64,
+        /// What would fit, if anything simple does.
+        hint: String,
     },
     /// Rows with another number of joints.
     #[error("row {row} has {found} joint readings, the robot has {expected} joints")]
@@ -229,6 +244,7 @@ fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], bases: usize) 
     };
     let prior: Vec<f64> = (0..width).map(prior).collect();
     let mut parameters: DVector<f64> = DVector::zeros(width);
+    let reach: f64 = mechanism.segments.iter().map(|segment| segment.translation.vector.norm()).sum();
     let equations = per_row * measurements.len();
     let mut damping = 0.0;
     let mut best = f64::INFINITY;
@@ -315,9 +331,19 @@ fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], bases: usize) 
                     .sum::<f64>()
                     / measurements.len() as f64,
             );
-            let reach: f64 = mechanism.segments.iter().map(|segment| segment.translation.vector.norm()).sum();
             if rms.is_nan() || rms >= 0.05 * reach.max(0.1) {
-                return Err(DiagnosisError::NotThisRobot { rms_mm: rms * 1e3 });
+                return Err(DiagnosisError::NotThisRobot { rms_mm: rms * 1e3, hint: mistake::hint(arm, measurements) });
+            }
+            let largest = |turn: bool| {
+                let of = |column: &usize| !free[*column] && (column % 6 >= 3) == turn;
+                (0..width).filter(of).map(|column| (parameters[column] * prior[column]).abs()).fold(0.0, f64::max)
+            };
+            if parameters.iter().zip(&free).any(|(value, free)| !free && value.abs() > IMPLAUSIBLE) {
+                return Err(DiagnosisError::NotThisGeometry {
+                    shift_mm: largest(false) * 1e3,
+                    turn_deg: largest(true).to_degrees(),
+                    hint: mistake::hint(arm, measurements),
+                });
             }
             return Ok(Rows {
                 mechanism,
@@ -374,24 +400,4 @@ pub(super) fn scaled(matrix: &DMatrix<f64>, weights: &DVector<f64>) -> DMatrix<f
         column.component_mul_assign(weights);
     }
     result
-}
-
-/// The pose that brings `from` nearest to `to` (Kabsch 1976); `None` where the points lie on a line.
-fn registration(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Pose> {
-    let count = from.len() as f64;
-    let (from_centre, to_centre) = (from.iter().sum::<Vector3<f64>>() / count, to.iter().sum::<Vector3<f64>>() / count);
-    let covariance: Matrix3<f64> =
-        from.iter().zip(to).map(|(from, to)| (to - to_centre) * (from - from_centre).transpose()).sum();
-    let svd = covariance.svd(true, true);
-    let (u, v_t) = (svd.u?, svd.v_t?);
-    let mut values: Vec<f64> = svd.singular_values.iter().copied().collect();
-    values.sort_by(|a, b| b.total_cmp(a));
-    if values[1] <= values[0] * 1e-9 || !values[0].is_finite() || values[0] < 1e-12 {
-        return None;
-    }
-    let mut signs = Matrix3::identity();
-    let smallest = svd.singular_values.imin();
-    signs[(smallest, smallest)] = (u * v_t).determinant().signum();
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(u * signs * v_t));
-    Some(Pose::from_parts(Translation3::from(to_centre - rotation * from_centre), rotation))
 }

@@ -6,7 +6,7 @@ use super::evidence::{Candidates, Model, NoisePrior, extensions, log_posterior};
 use super::gram::Surviving;
 
 /// Most effects of a set.
-pub const MOST: usize = 4;
+pub const MOST: usize = 6;
 /// Sets kept at each size.
 const BEAM: usize = 5;
 /// Differences of log posterior beyond which a model adds nothing to a probability.

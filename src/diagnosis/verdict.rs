@@ -54,9 +54,10 @@ fn probability(analysis: &Analysis<'_>, test: impl Fn(usize) -> bool) -> f64 {
     analysis.found.models.iter().filter(|(members, _)| holds(members)).map(|(_, weight)| weight).sum::<f64>().min(1.0)
 }
 
-/// What parts of the data choose in the place of a claim of the best set: the folds that lack it and hold a claim that the best set has
-/// not, with that claim's share of all folds. A posterior given all data is too sure of the least wrong of wrong models; where parts
-/// of the data contradict it, the parts are believed (Huggins and Miller 2023, "Reproducible model selection using bagged posteriors").
+/// What parts of the data prefer to a claim of the best set: the folds whose best set lacks it and holds a claim that the best set of all
+/// data has not, each with by how much it prefers that one (difference of probabilities), as a share of all folds. A posterior given
+/// all data is too sure of the least wrong of wrong models; where parts of the data contradict it, the parts are believed (Huggins and
+/// Miller 2023, "Reproducible model selection using bagged posteriors").
 fn rivals(analysis: &Analysis<'_>, this: Claim) -> Vec<(Claim, usize, f64)> {
     let best: Vec<Claim> = analysis.found.best.members.iter().map(|(member, _)| claim(analysis, *member)).collect();
     let folds = analysis.held_out.first().map_or(&[][..], |by_region| &by_region.folds);
@@ -65,8 +66,12 @@ fn rivals(analysis: &Analysis<'_>, this: Claim) -> Vec<(Claim, usize, f64)> {
         let Some(other) = fold.chosen.iter().copied().find(|other| !best.contains(&claim(analysis, *other))) else {
             continue;
         };
-        let share = 1.0 / folds.len() as f64;
+        let of = |one: Claim| -> f64 {
+            let holds = |members: &[(usize, usize)]| members.iter().any(|(member, _)| claim(analysis, *member) == one);
+            fold.models.iter().filter(|(members, _)| holds(members)).map(|(_, weight)| weight).sum()
+        };
         let rival = claim(analysis, other);
+        let share = (of(rival) - of(this)).max(0.0) / folds.len() as f64;
         match found.iter_mut().find(|(known, _, _)| *known == rival) {
             Some((_, _, sum)) => *sum += share,
             None => found.push((rival, other, share)),
@@ -193,7 +198,9 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
         let gap = before * before - floor2;
         (gap > 0.02 * floor2 && gap > 0.0).then(|| 1.0 - (after * after - floor2) / gap)
     };
-    let gap_closed = closed(geometry_rms_m, explained_rms_m);
+    // Where nothing was chosen nothing is closed.
+    let chosen_any = folds.iter().any(|fold| !fold.chosen.is_empty());
+    let gap_closed = closed(geometry_rms_m, explained_rms_m).filter(|_| chosen_any);
     let gap_closed_ci95 = gap_closed.and_then(|_| {
         let of_folds: Vec<f64> = folds
             .iter()
@@ -263,11 +270,12 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
         let rivalled: f64 = rivals(analysis, this).iter().map(|(_, _, share)| share).sum();
         let probability = probability(analysis, |other| claim(analysis, other) == this) * (1.0 - rivalled);
         let chosen = folds.iter().filter(|fold| fold.chosen.iter().any(|other| claim(analysis, *other) == this)).count();
-        // Beside something unknown a name may only stand in for it: it must be sure, the same whatever is left out, and help more than
-        // what has no name.
+        // Beside something unknown a name may only stand in for it: it must be sure, the same whatever is left out, help on readings
+        // that were not used, and help more than what has no name.
         let needed = if present { SURE } else { NAMED };
         let before_unknown = analysis.found.best.members[..step].iter().all(|(other, _)| !unknown_members.contains(other));
-        let stable = !present || (before_unknown && 5 * chosen >= 4 * folds.len());
+        let helps = after(step + 1) < after(step);
+        let stable = !present || (before_unknown && helps && 5 * chosen >= 4 * folds.len());
         let Some(magnitude) = magnitude(analysis, *hypothesis).filter(|_| probability >= needed && stable) else {
             continue;
         };
@@ -335,8 +343,17 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
     } else {
         Verdict::NotDetectable
     };
-    let next_measurements = next(analysis, &confusion_sets, verdict);
-    let sentence = sentence(verdict, &effects, &confusion_sets, &unknown, &gap, share);
+    let next_measurements = next(analysis, &confusion_sets, &undetectable, verdict);
+    let mut sentence = sentence(verdict, &effects, &confusion_sets, &unknown, &gap, share);
+    if verdict == Verdict::NoGap {
+        let seen = |kind: &str| detectable.iter().any(|one| one.kind == kind);
+        let mut blind: Vec<String> =
+            undetectable.iter().filter(|one| !seen(&one.kind)).map(|one| one.kind.replace('_', " ")).collect();
+        blind.dedup();
+        if !blind.is_empty() {
+            sentence.push_str(&format!(" Nowhere to be seen would have been: {}.", blind.join(", ")));
+        }
+    }
     Diagnosis {
         verdict,
         sentence,
@@ -599,7 +616,7 @@ fn sentence(verdict: Verdict, effects: &[Effect], sets: &[Vec<Candidate>], unkno
 }
 
 /// What to measure next.
-fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], verdict: Verdict) -> Vec<String> {
+fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], blind: &[Undetectable], verdict: Verdict) -> Vec<String> {
     let mut said: Vec<String> = Vec::new();
     let mut say = |text: &str| {
         if !said.iter().any(|known| known == text) {
@@ -628,13 +645,39 @@ fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], verdict: Verdict) -> V
             say("a shape without a name: more configurations where it shows");
         }
     }
+    // What these readings could not have shown, whatever they did show.
+    let places = |kind: Kind| -> Vec<String> {
+        let of_kind = blind.iter().filter(|one| one.kind == kind.name() && one.minimum_detectable.value.is_none());
+        of_kind.filter_map(|one| one.location.index).map(|index| index.to_string()).collect()
+    };
+    if !columns.approach {
+        say(
+            "backlash could not show: record from which side each joint was approached (columns approach1, …), and use both sides",
+        );
+    } else {
+        let joints = places(Kind::Backlash);
+        if !joints.is_empty() {
+            say(&format!(
+                "backlash of joint {} could not show, for it was always approached from the same side: approach it from both",
+                joints.join(", ")
+            ));
+        }
+    }
+    if !columns.temperature {
+        let known = analysis.measurements.iter().any(|row| row.ambient_c.is_some() || !row.temperatures_c.is_empty());
+        say(if known {
+            "thermal effects could not show, for the temperature never changed: let the arm warm up and cool down in one session"
+        } else {
+            "thermal effects could not show: record temperatures (temp_ambient_c, temp1_c, …) while the arm warms up and cools down"
+        });
+    }
+    let payload = analysis.measurements.first().and_then(|row| row.payload_kg);
+    if analysis.measurements.iter().all(|row| row.payload_kg == payload) {
+        say(
+            "linear and saturating effects of load look alike under one payload: the same configurations with two or three payloads",
+        );
+    }
     if verdict != Verdict::Explained {
-        if !columns.approach {
-            say("record from which side each joint was approached (columns approach1, …), and use both sides");
-        }
-        if !columns.temperature {
-            say("record temperatures (temp_ambient_c, temp1_c, …) while the arm warms up and cools down");
-        }
         if analysis.repeats.is_none() {
             say("read some configurations twice, approached alike: repeats tell the noise");
         }

@@ -1,9 +1,10 @@
 //! Where a real arm stands in the measurement frame, and where the target sits on its tool: unknown, and fitted before all else.
 
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 
 use super::least_squares::fit_some;
 use crate::arm::Arm;
+use crate::frames::registration;
 use crate::measurement::{Measurement, Sensor};
 
 /// The measurement frame and the target could not be found.
@@ -42,7 +43,8 @@ pub fn align(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement]) -> Resul
     let poses: Vec<_> = measurements.iter().map(|measurement| nominal.forward(&measurement.joints)).collect();
     let measured: Vec<Vector3<f64>> = measurements.iter().map(|measurement| measurement.position().coords).collect();
     let predicted: Vec<Vector3<f64>> = poses.iter().map(|pose| pose.translation.vector).collect();
-    let (rotation, translation) = registration(&predicted, &measured).ok_or(AlignmentError::Degenerate)?;
+    let registered = registration(&predicted, &measured).ok_or(AlignmentError::Degenerate)?;
+    let (rotation, translation) = (registered.rotation, registered.translation.vector);
 
     let mut aligned = arm.clone();
     aligned.chain = arm.chain.in_measurement_frame();
@@ -68,24 +70,4 @@ pub fn align(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement]) -> Resul
         parameter.nominal = value;
     }
     Ok(aligned)
-}
-
-/// The rotation and translation that bring `from` nearest to `to` (Kabsch 1976); `None` where the points lie on a line.
-fn registration(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<(UnitQuaternion<f64>, Vector3<f64>)> {
-    let count = from.len() as f64;
-    let (from_centre, to_centre) = (from.iter().sum::<Vector3<f64>>() / count, to.iter().sum::<Vector3<f64>>() / count);
-    let covariance: Matrix3<f64> =
-        from.iter().zip(to).map(|(from, to)| (to - to_centre) * (from - from_centre).transpose()).sum();
-    let svd = covariance.svd(true, true);
-    let (u, v_t) = (svd.u?, svd.v_t?);
-    let mut values: Vec<f64> = svd.singular_values.iter().copied().collect();
-    values.sort_by(|a, b| b.total_cmp(a));
-    if values[1] <= values[0] * 1e-9 || !values[0].is_finite() {
-        return None;
-    }
-    let smallest = svd.singular_values.imin();
-    let mut signs = Matrix3::identity();
-    signs[(smallest, smallest)] = (u * v_t).determinant().signum();
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(u * signs * v_t));
-    Some((rotation, to_centre - rotation * from_centre))
 }

@@ -1,7 +1,7 @@
 //! What is looked for: every kind at every place, and shapes that have no name.
 
 use super::posture::Mechanism;
-use super::shape::{FORGETTING_S, MEMORIES, Shape};
+use super::shape::{FORGETTING_S, MAP_ORDERS, MEMORIES, Shape};
 use crate::effects::{Kind, Location};
 
 /// One second of arc, rad.
@@ -159,6 +159,9 @@ fn nameless(joint: usize, turns: bool, columns: &Columns, all: &mut Vec<Hypothes
             vec![1.0, 0.5, 0.5],
             format!("error of joint {} grows with its angle", joint + 1),
         );
+        // Smooth: the higher, the smaller.
+        let spread = (1..=MAP_ORDERS).map(|order| 1.0 / order as f64).collect();
+        push(Shape::AngleMap { joint, low, high }, angle, spread, format!("error of joint {} follows its angle", joint + 1));
         for moving in [false, true] {
             let detail = format!("moment across the axis of joint {} turns it", joint + 1);
             push(Shape::Crosstalk { joint, moving }, [0.3e-5, 3e-5], vec![half; 2], detail);

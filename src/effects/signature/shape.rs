@@ -63,6 +63,15 @@ pub enum Shape {
     },
     /// \[3\] A joint turns with its angle, the square and the cube of it.
     AngleCurve(usize),
+    /// \[[`MAP_ORDERS`]\] A joint is off by a free function of its angle: cosines over its travel.
+    AngleMap {
+        /// Joint.
+        joint: usize,
+        /// Smallest angle, rad.
+        low: f64,
+        /// Largest angle, rad.
+        high: f64,
+    },
     /// \[2\] The moments about the x and y axes of a joint's frame turn it about z; the frame is that of the moving side or of the
     /// side that the joint moves on.
     Crosstalk {
@@ -118,6 +127,9 @@ pub struct Reading {
 
 /// Ways (rad) over which a joint may forget.
 pub const MEMORIES: [f64; 2] = [0.4, 1.2];
+
+/// Cosines of a free map of a joint's angle.
+pub const MAP_ORDERS: usize = 8;
 
 /// Times (s) over which a joint may yield.
 pub const FORGETTING_S: [f64; 3] = [25.0, 60.0, 150.0];
@@ -199,6 +211,10 @@ impl Shape {
                 let angle = reading.joints[joint];
                 [angle, angle * angle, angle * angle * angle / 3.0].map(|amount| reading.moved(joint, amount)).to_vec()
             }
+            Shape::AngleMap { joint, low, high } => {
+                let part = std::f64::consts::PI * (reading.joints[joint] - low) / (high - low).max(1e-9);
+                (1..=MAP_ORDERS).map(|order| reading.moved(joint, libm::cos(order as f64 * part))).collect()
+            }
             Shape::Crosstalk { joint, moving } => {
                 let mut frame = posture.frames[joint];
                 if !moving {
@@ -260,6 +276,7 @@ impl Shape {
             | Shape::AllYield
             | Shape::TimeCurve(_) => 2,
             Shape::AngleCurve(_) => 3,
+            Shape::AngleMap { .. } => MAP_ORDERS,
             Shape::BaseDrift | Shape::BaseStep(_) => 6,
             Shape::ToolStep(_) => {
                 if attitude {
