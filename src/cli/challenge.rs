@@ -12,12 +12,13 @@ use super::arguments::{Baseline, ChallengeCommand, Global, NewOptions, SceneOpti
 use super::output;
 use super::reproduce::Progress;
 use crate::cell;
-use crate::effects::Kind;
+use crate::effects::{Kind, Location};
 use crate::experiments::arms::arm8;
 use crate::experiments::bench::Watcher;
 use crate::experiments::challenge::folder::{self, COMMITMENT, MANIFEST, SEAL};
-use crate::experiments::challenge::verdict::{Diagnose, Verdict, nothing};
-use crate::experiments::challenge::{Folder, Options, case, score};
+use crate::experiments::challenge::score::{self, Closure, closes};
+use crate::experiments::challenge::verdict::{Diagnose, Gap, Verdict, nothing};
+use crate::experiments::challenge::{CaseTruth, Folder, Options, TrueEffect, case};
 use crate::experiments::injection::Sort;
 use crate::recording::truth_file::write_whole;
 use crate::report;
@@ -37,10 +38,15 @@ fn diagnosis() -> Option<(&'static str, Diagnose)> {
 
 /// What `kincal diagnose` says of a case.
 fn diagnosed(case: &folder::Case) -> Result<serde_json::Value, String> {
+    diagnosed_among(case, None)
+}
+
+/// The same, of nothing but some kinds at some places.
+fn diagnosed_among(case: &folder::Case, only: Option<Vec<(Kind, Location)>>) -> Result<serde_json::Value, String> {
     let scene = crate::scene::parse(&case.start.scene, &case.name).map_err(|error| error.to_string())?.scene;
     let rows: Vec<_> = case.measurements.iter().collect();
     let without = case.withheld.iter().filter_map(|name| Kind::from_name(name)).collect();
-    let options = crate::diagnosis::Options { noise: crate::diagnosis::outcome::NoiseSource::Declared, without };
+    let options = crate::diagnosis::Options { noise: crate::diagnosis::outcome::NoiseSource::Declared, without, only };
     let found = crate::diagnosis::diagnose(&scene.arm, &scene.sensor, &rows, &options).map_err(|error| error.to_string())?;
     serde_json::to_value(&found).map_err(|error| error.to_string())
 }
@@ -49,6 +55,7 @@ pub(crate) fn command(global: &Global, command: &ChallengeCommand) -> anyhow::Re
     match command {
         ChallengeCommand::New(options) => new(global, options),
         ChallengeCommand::Score(options) => scored(global, options),
+        ChallengeCommand::Power(options) => super::power::command(global, options),
     }
 }
 
@@ -245,7 +252,8 @@ fn scored(global: &Global, options: &ScoreOptions) -> anyhow::Result<Outcome> {
         }
     };
     let sealed = folder.unseal()?;
-    let score = score(&sealed.cases, &verdicts, &folder.manifest.withheld);
+    let mut score = score::score(&sealed.cases, &verdicts, &folder.manifest.withheld);
+    score.closure = closure(global, &folder, &sealed.cases, &verdicts)?;
     let text = report::challenge::score(&score, &who, &seconds);
     let figure = report::challenge::figure(&score);
     let mut written = Vec::new();
@@ -269,6 +277,36 @@ fn scored(global: &Global, options: &ScoreOptions) -> anyhow::Result<Outcome> {
         &json!({ "commitment": folder.manifest.commitment, "diagnosed_by": who, "score": score, "seconds": seconds, "files": written }),
     )?;
     Ok(Outcome::Good)
+}
+
+/// What verdicts close of the gap, over what kincal's diagnosis does that looks for nothing but what is there. `None` where no verdict
+/// says what it closes, or no case has what should be closed.
+fn closure(global: &Global, folder: &Folder, truths: &[CaseTruth], verdicts: &[Verdict]) -> anyhow::Result<Option<Closure>> {
+    let withheld = &folder.manifest.withheld;
+    let asked: Vec<(usize, Gap)> = (0..truths.len())
+        .filter(|index| closes(&truths[*index], withheld))
+        .filter_map(|index| Some((index, verdicts[index].gap?)))
+        .collect();
+    if asked.is_empty() {
+        return Ok(None);
+    }
+    let progress = Progress::new(global);
+    progress.begin("knowing", asked.len());
+    let pairs: Vec<(Gap, Gap)> = asked
+        .into_par_iter()
+        .map(|(index, own)| {
+            let case = folder.case(index)?;
+            let is = |effect: &TrueEffect| Some((Kind::from_name(&effect.kind)?, effect.location));
+            let only = truths[index].effects.iter().filter_map(is).collect();
+            let found = diagnosed_among(&case, Some(only)).map_err(|why| anyhow::anyhow!("{}: {why}", case.path.display()))?;
+            let found: Verdict = serde_json::from_value(found).context("the diagnosis is no verdict")?;
+            progress.step();
+            Ok(found.gap.map(|best| (own, best)))
+        })
+        .filter_map(anyhow::Result::transpose)
+        .collect::<anyhow::Result<_>>()?;
+    progress.end();
+    Ok(Some(score::closure(&pairs)))
 }
 
 #[cfg(test)]

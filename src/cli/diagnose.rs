@@ -24,7 +24,7 @@ pub(crate) fn command(global: &Global, options: &DiagnoseOptions) -> anyhow::Res
     }
     let subject = subject(global, options)?;
     let rows: Vec<&Measurement> = subject.measurements.iter().collect();
-    let options_of_diagnosis = Options { noise: subject.noise, without };
+    let options_of_diagnosis = Options { noise: subject.noise, without, only: None };
     let mut diagnosis = diagnosis::diagnose(&subject.arm, &subject.sensor, &rows, &options_of_diagnosis)
         .with_context(|| options.input.display().to_string())?;
     diagnosis.notes.extend(subject.notes);

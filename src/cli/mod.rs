@@ -12,6 +12,7 @@ mod identify;
 mod input;
 mod measure;
 mod output;
+mod power;
 mod replay;
 mod reproduce;
 mod run;

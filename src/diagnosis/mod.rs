@@ -25,9 +25,9 @@ pub mod waterfall;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::Arm;
-use crate::effects::Kind;
 use crate::effects::signature::library::{Hypothesis, library};
 use crate::effects::signature::shape::{Displacement, Shape};
+use crate::effects::{Kind, Location};
 use crate::measurement::{Measurement, Sensor};
 use conditions::Conditions;
 use evidence::{Candidates, NoisePrior};
@@ -55,6 +55,8 @@ pub struct Options {
     pub noise: NoiseSource,
     /// Kinds that are left out of the library.
     pub without: Vec<Kind>,
+    /// Nothing but these kinds at these places, for who knows what is there.
+    pub only: Option<Vec<(Kind, Location)>>,
 }
 
 /// What was found, before it is put into words.
@@ -107,6 +109,10 @@ pub fn diagnose(
         let hypotheses: Vec<Hypothesis> = library(&rows.mechanism, &conditions.columns)
             .into_iter()
             .filter(|hypothesis| hypothesis.kind.is_none_or(|kind| !options.without.contains(&kind)))
+            .filter(|hypothesis| {
+                let is = |(kind, place): &(Kind, Location)| hypothesis.kind == Some(*kind) && hypothesis.location == *place;
+                options.only.as_ref().is_none_or(|only| only.iter().any(is))
+            })
             .collect();
         let (mut raw, mut candidates) = matrix(&rows, &conditions, hypotheses);
         put_back(&mut raw, &rows, &displacement);

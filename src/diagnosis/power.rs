@@ -1,76 +1,655 @@
-//! What a data set would show: the least magnitude of every hypothesis that would be named in four cases of five.
+//! What a data set would show: the least magnitude of every kind at every place that would be named in four cases of five.
+//!
+//! Once geometry is out everything is linear and Gaussian, so the analyser is run on draws of the few numbers that it looks at: the
+//! inner products of the residual with the signature and with those that are most alike. The same draws serve every magnitude. What
+//! is unlike the truth does not matter: it is as likely beside it as without it.
 
-use super::evidence::{Candidates, SCALES};
+use std::ops::Range;
+
+use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
+
+use super::evidence::{Candidates, NoisePrior, SCALES, one_signed};
 use super::gram::Surviving;
+use crate::seed::stream;
 
-/// Standard normal quantile of 80 %.
-const POWER: f64 = 0.8416;
-/// Log odds of 0.95.
-const NAMED: f64 = 2.944;
-/// Likeness (cosine squared) beyond which two signatures are one.
-const ONE: f64 = 0.999;
+/// Share of cases in which the least magnitude is named.
+const POWER: f64 = 0.8;
+/// From this probability on something is named.
+const NAMED: f64 = 0.5;
+/// Draws of a claim, shared by its variants.
+const DRAWS: usize = 192;
+/// Variants of a claim that are taken as the truth.
+const TRUTHS: usize = 4;
+/// Variants of the same claim, and rivals, that are looked at.
+const ALIKE: [usize; 2] = [9, 10];
+/// Columns of all that is looked at.
+const COLUMNS: usize = 64;
+/// Likeness from which on a rival is looked at.
+const UNLIKE: f64 = 0.01;
+/// Differences of log posterior beyond which a rival adds nothing.
+const NEGLIGIBLE: f64 = 9.0;
+/// Log prior odds of what is not in play.
+const OUT_OF_PLAY: f64 = -6.0;
+/// Logarithm of two: what a sign is worth at most.
+const LOG_2: f64 = std::f64::consts::LN_2;
 
-/// The power of a hypothesis.
+/// The power of a claim.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Power {
     /// Least magnitude, SI; `None` where nothing survives.
     pub least: Option<f64>,
-    /// Hypothesis that is most alike, and how much.
+    /// Named hypothesis of another claim that is most alike, and how much (cosine squared).
     pub alike: Option<(usize, f64)>,
 }
 
-/// λ at which the log odds reach [`NAMED`] in four cases of five: `½ (λ − 2·0.84 √λ + w) + log prior odds − ½ log|1 + f² G| ≥ 2.94`.
-fn lambda_needed(log_odds: f64, width: f64, information: f64) -> f64 {
-    let mut lambda: f64 = 20.0;
-    for _ in 0..50 {
-        let size = libm::sqrt(lambda / information.max(1e-300));
-        let (scale, share) = SCALES
-            .iter()
-            .copied()
-            .min_by(|a, b| (libm::log(a.0) - libm::log(size)).abs().total_cmp(&(libm::log(b.0) - libm::log(size)).abs()))
-            .unwrap_or(SCALES[0]);
-        let penalty = 0.5 * width * libm::log(1.0 + scale * scale * information / width) - libm::log(share);
-        let needed = 2.0 * (NAMED - log_odds + penalty) - width;
-        // λ − 2·0.84 √λ = needed.
-        let root = POWER + libm::sqrt((POWER * POWER + needed).max(0.0));
-        lambda = 0.5 * (lambda + root * root);
-    }
-    lambda
+/// Finds what a data set would show.
+pub struct Bench<'a> {
+    candidates: &'a Candidates,
+    surviving: &'a Surviving,
+    prior: NoisePrior,
+    noise: f64,
+    /// What is found already, each with the scale of its prior.
+    found: &'a [(usize, usize)],
+    /// Of every hypothesis, the inverse of its inner products.
+    inverses: Vec<DMatrix<f64>>,
+    /// Draws of standard normals that all claims share, so that one can be compared with another.
+    pool: Vec<Pool>,
 }
 
-/// The power of `hypothesis` where the noise's mean square is `noise` (in declared sigmas).
-#[must_use]
-pub fn power(candidates: &Candidates, surviving: &Surviving, noise: f64, hypothesis: usize) -> Power {
-    let columns = candidates.columns(hypothesis);
-    let width = columns.len() as f64;
-    let information: f64 = columns.clone().map(|column| surviving.products[(column, column)]).sum::<f64>() / noise;
-    if information < 1e-8 {
-        return Power { least: None, alike: None };
+/// What is drawn at once.
+struct Pool {
+    /// Along the signal; these are quantiles, each once.
+    along: f64,
+    /// Of the columns.
+    columns: [f64; COLUMNS],
+    /// Of all other equations together.
+    rest: f64,
+    /// Where the effect points.
+    direction: [f64; 6],
+    /// Share of a turn beside a translation.
+    turn: f64,
+}
+
+/// Something that is looked at.
+struct Member {
+    hypothesis: usize,
+    own: bool,
+    signed: bool,
+    columns: Range<usize>,
+    /// By scale, all that no draw changes.
+    constant: [f64; SCALES.len()],
+    largest: f64,
+}
+
+/// A truth, what is looked at beside it, and draws. Columns are along the principal axes of each member.
+struct World {
+    members: Vec<Member>,
+    /// By column, one over inner product and precision of each scale.
+    inverse: Vec<[f64; SCALES.len()]>,
+    /// Draw by draw: what a unit magnitude adds to the inner products with the residual, and the noise in them.
+    signal: Vec<f64>,
+    noise: Vec<f64>,
+    draws: Vec<Draw>,
+    /// Half the equations, and what the residual's square has beside them.
+    half: f64,
+    pinned: f64,
+}
+
+/// Squares of a draw: of a unit magnitude's signal, twice its product with the noise, of the noise.
+struct Draw {
+    signal: f64,
+    cross: f64,
+    noise: f64,
+}
+
+impl<'a> Bench<'a> {
+    /// For data whose inner products are `surviving`, with a noise of mean square `noise` (in declared sigmas) of which `prior` is known
+    /// beforehand, and with the effects `found`, beside which everything else has to show.
+    #[must_use]
+    pub fn new(
+        candidates: &'a Candidates,
+        surviving: &'a Surviving,
+        prior: NoisePrior,
+        noise: f64,
+        found: &'a [(usize, usize)],
+    ) -> Bench<'a> {
+        let inverses = (0..candidates.hypotheses.len())
+            .map(|hypothesis| {
+                let columns = candidates.columns(hypothesis);
+                let block = surviving.products.view((columns.start, columns.start), (columns.len(), columns.len())).into_owned();
+                firm(block).map_or_else(|| DMatrix::zeros(columns.len(), columns.len()), |cholesky| cholesky.inverse())
+            })
+            .collect();
+        let mut stream = stream(0, "power");
+        let mut quantiles: Vec<f64> = (0..DRAWS).map(|draw| normal_quantile((draw as f64 + 0.5) / DRAWS as f64)).collect();
+        stream.shuffle(&mut quantiles);
+        let pool = quantiles
+            .into_iter()
+            .map(|along| Pool {
+                along,
+                columns: std::array::from_fn(|_| stream.normal()),
+                rest: stream.normal(),
+                direction: std::array::from_fn(|_| stream.normal()),
+                turn: stream.uniform(0.2, 1.0),
+            })
+            .collect();
+        Bench { candidates, surviving, prior, noise: noise.max(1e-12), found, inverses, pool }
     }
-    let log_odds = if candidates.log_odds[hypothesis].is_finite() { candidates.log_odds[hypothesis] } else { -6.0 };
-    let mut lambda = lambda_needed(log_odds, width, information);
-    let mut alike = None;
-    if columns.len() == 1 {
-        let own = surviving.products[(columns.start, columns.start)];
-        let this = &candidates.hypotheses[hypothesis];
-        for other in 0..candidates.hypotheses.len() {
-            let that = &candidates.hypotheses[other];
-            let same = that.kind == this.kind && that.location == this.location;
-            let of_other = candidates.columns(other);
-            if same || !candidates.active[other] || of_other.len() != 1 || that.kind.is_none() {
+
+    fn information(&self, hypothesis: usize) -> f64 {
+        self.candidates.columns(hypothesis).map(|column| self.surviving.products[(column, column)]).sum()
+    }
+
+    /// Share of the signal of `truth` that `other` can stand in for.
+    fn likeness(&self, truth: usize, other: usize) -> f64 {
+        let (of, by) = (self.candidates.columns(truth), self.candidates.columns(other));
+        let inverse = &self.inverses[other];
+        let (mut explained, mut all) = (0.0, 0.0);
+        for column in of {
+            all += self.surviving.products[(column, column)];
+            for i in 0..by.len() {
+                let left = self.surviving.products[(by.start + i, column)];
+                for j in 0..by.len() {
+                    explained += left * inverse[(i, j)] * self.surviving.products[(by.start + j, column)];
+                }
+            }
+        }
+        (explained / all.max(1e-300)).clamp(0.0, 1.0)
+    }
+
+    /// The power of the claim whose variants are `variants`, each as likely.
+    #[must_use]
+    pub fn power(&self, variants: &[usize]) -> Power {
+        let shows = |variant: &usize| self.information(*variant) / self.noise >= 1e-8;
+        let seen: Vec<usize> = variants.iter().copied().filter(shows).collect();
+        if seen.is_empty() || 2 * seen.len() < variants.len() {
+            return Power { least: None, alike: None };
+        }
+        let count = seen.len().min(TRUTHS);
+        let mut alike: Option<(usize, f64)> = None;
+        let mut worlds = Vec::with_capacity(count);
+        for number in 0..count {
+            let truth = seen[(2 * number + 1) * seen.len() / (2 * count)];
+            let shares: Vec<(usize, f64)> = (0..self.candidates.hypotheses.len())
+                .filter(|other| *other != truth && (self.candidates.active[*other] || variants.contains(other)))
+                .map(|other| (other, self.likeness(truth, other)))
+                .collect();
+            for (other, share) in &shares {
+                let named = self.candidates.hypotheses[*other].kind.is_some() && !variants.contains(other);
+                if named && alike.is_none_or(|(_, most)| *share > most) {
+                    alike = Some((*other, *share));
+                }
+            }
+            worlds.extend(self.world(truth, variants, shares, number, count));
+        }
+        Power { least: self.least(&worlds), alike }
+    }
+
+    /// The least magnitude that is named often enough in `worlds`.
+    fn least(&self, worlds: &[World]) -> Option<f64> {
+        let draws: usize = worlds.iter().map(|world| world.draws.len()).sum();
+        // What is named at a smaller magnitude and at a larger one is named between; what is at neither is not.
+        let named = |size: f64, low: &[bool], high: &[bool]| -> Vec<bool> {
+            let all = worlds.iter().flat_map(|world| (0..world.draws.len()).map(move |draw| (world, draw)));
+            let known = low.iter().zip(high);
+            all.zip(known)
+                .map(|((world, draw), (low, high))| if low == high { *low } else { world.is_named(draw, size) })
+                .collect()
+        };
+        let enough = |named: &[bool]| named.iter().filter(|named| **named).count() as f64 >= POWER * draws as f64;
+        let (never, always) = (vec![false; draws], vec![true; draws]);
+        let mean = worlds.iter().flat_map(|world| &world.draws).map(|draw| draw.signal).sum::<f64>() / draws.max(1) as f64;
+        if draws == 0 || mean <= 0.0 {
+            return None;
+        }
+        // λ of about 25 is usual.
+        let (mut low, mut high) = (libm::sqrt(12.0 * self.noise / mean), libm::sqrt(40.0 * self.noise / mean));
+        let (mut below, mut above) = (named(low, &never, &always), named(high, &never, &always));
+        let mut tries = 0;
+        while !enough(&above) {
+            (low, below) = (high, above);
+            high *= 2.0;
+            above = named(high, &never, &always);
+            tries += 1;
+            if tries > 14 {
+                return None;
+            }
+        }
+        while enough(&below) {
+            (high, above) = (low, below);
+            low *= 0.5;
+            below = named(low, &never, &always);
+            tries += 1;
+            if tries > 20 {
+                return Some(high);
+            }
+        }
+        while high / low > 1.01 {
+            let middle = libm::sqrt(low * high);
+            let between = named(middle, &below, &above);
+            if enough(&between) {
+                (high, above) = (middle, between);
+            } else {
+                (low, below) = (middle, between);
+            }
+        }
+        Some(libm::sqrt(low * high))
+    }
+
+    /// The world in which `truth` is there: number `number` of `count` of its claim.
+    fn world(
+        &self,
+        truth: usize,
+        variants: &[usize],
+        mut shares: Vec<(usize, f64)>,
+        number: usize,
+        count: usize,
+    ) -> Option<World> {
+        let apart = |member: usize| !variants.contains(&member) && !self.candidates.exclude(member, truth);
+        let beside: Vec<(usize, usize)> = self.found.iter().copied().filter(|(member, _)| apart(*member)).collect();
+        let taken = |other: usize| beside.iter().any(|(member, _)| self.candidates.exclude(*member, other));
+        shares.retain(|(other, share)| *share >= UNLIKE && !taken(*other));
+        shares.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let mut chosen = vec![truth];
+        let mut room = COLUMNS - self.candidates.columns(truth).len();
+        let mut left = ALIKE;
+        for (other, _) in &shares {
+            let (width, which) = (self.candidates.columns(*other).len(), usize::from(!variants.contains(other)));
+            if left[which] > 0 && width <= room {
+                left[which] -= 1;
+                room -= width;
+                chosen.push(*other);
+            }
+        }
+        // What it claims comes first, so that rivals that are far behind it are passed over.
+        chosen[1..].sort_by_key(|other| !variants.contains(other));
+        let columns: Vec<usize> = chosen.iter().flat_map(|member| self.candidates.columns(*member)).collect();
+        let size = columns.len();
+        let mut products = DMatrix::from_fn(size, size, |i, j| self.surviving.products[(columns[i], columns[j])]);
+        // What is found takes its part out of everything else.
+        let fitted: Vec<(usize, f64)> = beside
+            .iter()
+            .flat_map(|(member, scale)| {
+                self.candidates.columns(*member).map(|column| (column, 1.0 / (SCALES[*scale].0 * SCALES[*scale].0)))
+            })
+            .collect();
+        if !fitted.is_empty() {
+            let normal = DMatrix::from_fn(fitted.len(), fitted.len(), |i, j| {
+                self.surviving.products[(fitted[i].0, fitted[j].0)] + if i == j { fitted[i].1 } else { 0.0 }
+            });
+            let cross = DMatrix::from_fn(fitted.len(), size, |i, j| self.surviving.products[(fitted[i].0, columns[j])]);
+            products -= cross.tr_mul(&Cholesky::new(normal)?.solve(&cross));
+        }
+        let mut axes = DMatrix::zeros(size, size);
+        let mut members = Vec::with_capacity(chosen.len());
+        let mut inverse = vec![[0.0; SCALES.len()]; size];
+        let mut first = 0;
+        for hypothesis in chosen {
+            let width = self.candidates.columns(hypothesis).len();
+            let block = products.view((first, first), (width, width)).into_owned();
+            let (values, vectors) = if width == 1 {
+                (vec![block[(0, 0)]], DMatrix::identity(1, 1))
+            } else {
+                let eigen = SymmetricEigen::new(block);
+                (eigen.eigenvalues.iter().map(|value| value.max(0.0)).collect(), eigen.eigenvectors)
+            };
+            axes.view_mut((first, first), (width, width)).copy_from(&vectors);
+            let log_odds = self.candidates.log_odds[hypothesis];
+            let mut constant = [if log_odds.is_finite() { log_odds } else { OUT_OF_PLAY }; SCALES.len()];
+            for (scale, (size, share)) in SCALES.iter().enumerate() {
+                constant[scale] += libm::log(*share);
+                for (i, value) in values.iter().enumerate() {
+                    inverse[first + i][scale] = 1.0 / (value + 1.0 / (size * size));
+                    constant[scale] -= 0.5 * libm::log(1.0 + value * size * size);
+                }
+            }
+            members.push(Member {
+                hypothesis,
+                own: variants.contains(&hypothesis),
+                signed: one_signed(&self.candidates.hypotheses[hypothesis]),
+                columns: first..first + width,
+                constant,
+                largest: constant.into_iter().fold(f64::NEG_INFINITY, f64::max) + LOG_2,
+            });
+            first += width;
+        }
+        let products = axes.tr_mul(&(products * &axes));
+        let factor = firm(products.clone())?.unpack();
+        let mut world = World {
+            members,
+            inverse,
+            signal: Vec::new(),
+            noise: Vec::new(),
+            draws: Vec::new(),
+            half: 0.5 * (self.prior.freedom + self.surviving.freedom),
+            pinned: self.prior.freedom * self.prior.level,
+        };
+        self.draw(&mut world, &products, &factor, &axes, number, count);
+        Some(world)
+    }
+
+    /// Draws for `world`, whose columns have these inner products and their factor.
+    fn draw(
+        &self,
+        world: &mut World,
+        products: &DMatrix<f64>,
+        factor: &DMatrix<f64>,
+        axes: &DMatrix<f64>,
+        number: usize,
+        count: usize,
+    ) {
+        let size = products.nrows();
+        let width = world.members[0].columns.len();
+        let truth = &self.candidates.hypotheses[world.members[0].hypothesis];
+        let unit = self.candidates.unit[world.members[0].hypothesis];
+        let sigma = libm::sqrt(self.noise);
+        // Row by row.
+        let rows: Vec<f64> = (0..size).flat_map(|i| (0..=i).map(move |j| factor[(i, j)])).collect();
+        let shown: Vec<f64> = (0..size).flat_map(|i| (0..width).map(move |j| products[(i, j)])).collect();
+        let (mut direction, mut own, mut normal) = (vec![0.0; width], vec![0.0; width], vec![0.0; size]);
+        for pool in self.pool.iter().skip(number).step_by(count) {
+            towards(&mut direction, world.members[0].signed, pool);
+            // Along the principal axes of the truth.
+            for (i, own) in own.iter_mut().enumerate() {
+                *own = (0..width).map(|j| axes[(j, i)] * direction[j] / (unit * truth.spread[j])).sum();
+            }
+            let signal: f64 = (0..width).map(|i| own[i] * own[i] * products[(i, i)]).sum();
+            normal.copy_from_slice(&pool.columns[..size]);
+            // What decides is the noise along the signal: there its quantiles are met one by one.
+            let length = libm::sqrt(signal.max(1e-300));
+            let along: f64 = (0..width).map(|i| normal[i] * own[i] * factor[(i, i)]).sum::<f64>() / length;
+            for i in 0..width {
+                normal[i] += (pool.along - along) * own[i] * factor[(i, i)] / length;
+            }
+            let mut squares: f64 = normal.iter().map(|value| value * value).sum();
+            squares += chi_square(self.surviving.freedom - size as f64, pool.rest);
+            let mut cross = 0.0;
+            let mut first = 0;
+            for i in 0..size {
+                let row = &rows[first..=first + i];
+                first += i + 1;
+                let noise = sigma * row.iter().zip(&normal).map(|(factor, normal)| factor * normal).sum::<f64>();
+                let shown = &shown[i * width..(i + 1) * width];
+                world.signal.push(shown.iter().zip(&own).map(|(product, own)| product * own).sum());
+                world.noise.push(noise);
+                if i < width {
+                    cross += 2.0 * own[i] * noise;
+                }
+            }
+            world.draws.push(Draw { signal, cross, noise: self.noise * squares });
+        }
+    }
+}
+
+/// A direction in which a unit magnitude may point, as effects have it: a sign; a phase; a translation; a translation with a turn.
+fn towards(direction: &mut [f64], signed: bool, pool: &Pool) {
+    let width = direction.len();
+    if width == 1 {
+        direction[0] = if signed || pool.direction[0] > 0.0 { 1.0 } else { -1.0 };
+        return;
+    }
+    direction.copy_from_slice(&pool.direction[..width]);
+    let scaled = |part: &mut [f64], length: f64| {
+        let norm = libm::sqrt(part.iter().map(|value| value * value).sum::<f64>()).max(1e-12);
+        part.iter_mut().for_each(|value| *value *= length / norm);
+    };
+    let (translation, rotation) = direction.split_at_mut(if width == 6 { 3 } else { width });
+    scaled(translation, 1.0);
+    scaled(rotation, pool.turn);
+}
+
+/// χ² with so many degrees of freedom where a standard normal is `normal` (Wilson and Hilferty).
+fn chi_square(freedom: f64, normal: f64) -> f64 {
+    if freedom < 1.0 {
+        return 0.0;
+    }
+    let part = 2.0 / (9.0 * freedom);
+    let root = 1.0 - part + normal * libm::sqrt(part);
+    freedom * (root * root * root).max(0.0)
+}
+
+/// The factor of a matrix that rounding may have left without one.
+fn firm(mut matrix: DMatrix<f64>) -> Option<Cholesky<f64, nalgebra::Dyn>> {
+    let largest = matrix.diagonal().max().max(1e-300);
+    for i in 0..matrix.nrows() {
+        matrix[(i, i)] += 1e-9 * matrix[(i, i)] + 1e-13 * largest;
+    }
+    Cholesky::new(matrix)
+}
+
+fn normal_quantile(share: f64) -> f64 {
+    let (mut low, mut high) = (-9.0, 9.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if 0.5 * libm::erfc(-middle * std::f64::consts::FRAC_1_SQRT_2) < share {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// As in the evidence: logarithm of the share of the posterior that physics allows, over that of the prior.
+fn log_allowed(z: f64) -> f64 {
+    if z > 6.0 {
+        LOG_2
+    } else if z < -6.0 {
+        -0.5 * z * z - libm::log(-z) - 0.919 + 0.693
+    } else {
+        libm::log(libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2))
+    }
+}
+
+/// A sum of exponentials of what is claimed and of everything else, relative to the largest.
+struct Tally {
+    top: f64,
+    own: f64,
+    other: f64,
+    top_is_own: bool,
+}
+
+impl Tally {
+    fn add(&mut self, log: f64, own: bool) {
+        if log < self.top - 1.5 * NEGLIGIBLE {
+            return;
+        }
+        let weight = if log > self.top {
+            let shrunk = libm::exp(self.top - log);
+            self.own *= shrunk;
+            self.other *= shrunk;
+            (self.top, self.top_is_own) = (log, own);
+            1.0
+        } else {
+            libm::exp(log - self.top)
+        };
+        if own {
+            self.own += weight;
+        } else {
+            self.other += weight;
+        }
+    }
+}
+
+impl World {
+    /// Whether a magnitude of `size` is named in a draw.
+    fn is_named(&self, draw: usize, size: f64) -> bool {
+        let columns = self.inverse.len();
+        let signal = &self.signal[draw * columns..(draw + 1) * columns];
+        let noise = &self.noise[draw * columns..(draw + 1) * columns];
+        let of = &self.draws[draw];
+        let residual = (of.noise + size * (of.cross + size * of.signal)).max(1e-12);
+        let before = self.pinned + residual;
+        let mut tally = Tally { top: 0.0, own: 0.0, other: 1.0, top_is_own: false };
+        for member in &self.members {
+            let mut drops = [0.0; SCALES.len()];
+            let mut right = 0.0;
+            for column in member.columns.clone() {
+                right = noise[column] + size * signal[column];
+                for (drop, inverse) in drops.iter_mut().zip(&self.inverse[column]) {
+                    *drop += right * right * inverse;
+                }
+            }
+            // The widest prior explains most; −log(1 − x) is x / (1 − x) at most.
+            let share = (drops[SCALES.len() - 1] / before).min(1.0 - 1e-9);
+            if member.largest + self.half * share / (1.0 - share) < tally.top - NEGLIGIBLE {
                 continue;
             }
-            let cross = surviving.products[(columns.start, of_other.start)];
-            let likeness = cross * cross / (own * surviving.products[(of_other.start, of_other.start)]).max(1e-300);
-            if alike.is_none_or(|(_, most)| likeness > most) {
-                alike = Some((other, likeness));
+            for (scale, drop) in drops.iter().enumerate() {
+                let after = (before - drop).max(1e-9 * before);
+                let mut log = member.constant[scale] - self.half * libm::log(after / before);
+                if member.signed {
+                    let level = after / (2.0 * self.half);
+                    log += log_allowed(right * libm::sqrt(self.inverse[member.columns.start][scale] / level));
+                }
+                tally.add(log, member.own);
             }
         }
-        if let Some((_, likeness)) = alike {
-            // The difference of the two must show as well: ½x − 0.84 √x ≥ 2.94.
-            let root = POWER + libm::sqrt(POWER * POWER + 2.0 * NAMED);
-            lambda = lambda.max(root * root / (1.0 - likeness.min(ONE)));
+        tally.top_is_own && tally.own >= NAMED * (tally.own + tally.other)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DVector;
+
+    use super::*;
+    use crate::diagnosis::evidence::log_posterior;
+    use crate::effects::signature::library::Hypothesis;
+    use crate::effects::signature::shape::Shape;
+    use crate::effects::{Kind, Location};
+
+    const ROWS: usize = 150;
+
+    fn hypothesis(kind: Option<Kind>, joint: usize, width: usize) -> Hypothesis {
+        Hypothesis {
+            kind,
+            location: Location { level: crate::effects::Level::Joint, index: Some(joint) },
+            shape: Shape::Torque(joint),
+            range: [0.5, 2.0],
+            spread: vec![if width == 2 { 0.7 } else { 1.0 }; width],
+            detail: String::new(),
         }
     }
-    Power { least: Some(candidates.unit[hypothesis] * libm::sqrt(lambda / information)), alike }
+
+    /// Signatures of `widths`, each made partly of the one before.
+    fn problem(likeness: f64) -> (Candidates, DMatrix<f64>) {
+        let hypotheses = vec![
+            hypothesis(Some(Kind::JointCompliance), 1, 1),
+            hypothesis(Some(Kind::Backlash), 1, 1),
+            hypothesis(None, 1, 1),
+            hypothesis(Some(Kind::JointEccentricity), 2, 2),
+            hypothesis(Some(Kind::JointEccentricity), 2, 2),
+            hypothesis(Some(Kind::GearCoupling), 2, 1),
+            hypothesis(Some(Kind::TiltClearance), 3, 1),
+        ];
+        let mut draws = stream(4, "test/power");
+        let (mut first, mut columns) = (Vec::new(), Vec::<DVector<f64>>::new());
+        for hypothesis in &hypotheses {
+            first.push(columns.len());
+            for _ in &hypothesis.spread {
+                let mut column = DVector::from_fn(ROWS, |_, _| draws.normal());
+                if let Some(before) = columns.last() {
+                    column = column * (1.0 - likeness * likeness).sqrt() + before * likeness;
+                }
+                columns.push(column);
+            }
+        }
+        let count = hypotheses.len();
+        let candidates = Candidates {
+            hypotheses,
+            first,
+            unit: vec![0.8; count],
+            log_odds: (0..count).map(|number| -3.0 - 0.3 * number as f64).collect(),
+            active: vec![true; count],
+        };
+        (candidates, DMatrix::from_columns(&columns))
+    }
+
+    fn surviving(signatures: &DMatrix<f64>, residual: &DVector<f64>) -> Surviving {
+        Surviving {
+            products: signatures.tr_mul(signatures),
+            with_residual: signatures.tr_mul(residual),
+            residual: residual.norm_squared(),
+            freedom: ROWS as f64,
+            absorbed: DMatrix::zeros(0, 0),
+        }
+    }
+
+    /// Cases row by row, with the evidence of the search itself.
+    #[test]
+    fn the_least_magnitude_is_named_in_four_cases_of_five() {
+        let prior = NoisePrior { freedom: 10.0, level: 1.0 };
+        let noise: f64 = 1.7;
+        for (likeness, found) in [(0.2, vec![]), (0.9, vec![]), (0.6, vec![(5, 1)])] {
+            let (candidates, signatures) = problem(likeness);
+            let unit = surviving(&signatures, &DVector::zeros(ROWS));
+            let bench = Bench::new(&candidates, &unit, prior, noise, &found);
+            let base = |with: &[(usize, usize)]| [&found[..], with].concat();
+            for variants in [vec![0], vec![1], vec![3, 4], vec![6]] {
+                let least = bench.power(&variants).least.unwrap();
+                let mut draws = stream(9, &format!("test/cases/{variants:?}"));
+                let cases = 600;
+                let mut right = 0;
+                for case in 0..cases {
+                    let truth = variants[case % variants.len()];
+                    let mut residual = DVector::from_fn(ROWS, |_, _| noise.sqrt() * draws.normal());
+                    let phase = draws.uniform(0.0, std::f64::consts::TAU);
+                    let sign = if truth == 0 || truth == 6 || phase < std::f64::consts::PI { 1.0 } else { -1.0 };
+                    for (i, column) in candidates.columns(truth).enumerate() {
+                        let share = if candidates.columns(truth).len() == 1 { sign } else { [phase.cos(), phase.sin()][i] };
+                        let spread = candidates.hypotheses[truth].spread[i];
+                        residual += signatures.column(column) * (least * share / (candidates.unit[truth] * spread));
+                    }
+                    for (member, _) in &found {
+                        residual += signatures.column(candidates.first[*member]) * 2.3;
+                    }
+                    let seen = surviving(&signatures, &residual);
+                    let without = log_posterior(&seen, &candidates, prior, &base(&[]));
+                    let (mut own, mut all, mut best) = (0.0, 1.0, (0.0, false));
+                    for member in (0..candidates.hypotheses.len()).filter(|member| found.iter().all(|(other, _)| other != member))
+                    {
+                        for scale in 0..SCALES.len() {
+                            let log = log_posterior(&seen, &candidates, prior, &base(&[(member, scale)])) - without;
+                            all += log.exp();
+                            if variants.contains(&member) {
+                                own += log.exp();
+                            }
+                            if log > best.0 {
+                                best = (log, variants.contains(&member));
+                            }
+                        }
+                    }
+                    right += usize::from(own >= 0.5 * all && best.1);
+                }
+                let share = f64::from(right as u32) / f64::from(cases as u32);
+                // Three standard errors of the count, and as much again for that of the draws.
+                assert!((share - 0.8).abs() < 0.07, "{variants:?} at {likeness}: {share}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_the_same_is_never_told_apart() {
+        let (candidates, mut signatures) = problem(0.2);
+        let copy = signatures.column(0) * 1.0;
+        signatures.set_column(1, &copy);
+        let unit = surviving(&signatures, &DVector::zeros(ROWS));
+        let bench = Bench::new(&candidates, &unit, NoisePrior { freedom: 10.0, level: 1.0 }, 1.0, &[]);
+        // Of two that are the same the one that is less likely beforehand is never named.
+        let power = bench.power(&[1]);
+        assert_eq!(power.least, None);
+        assert!(power.alike.is_some_and(|(other, likeness)| other == 0 && likeness > 0.999));
+        signatures.fill_column(8, 0.0);
+        let unit = surviving(&signatures, &DVector::zeros(ROWS));
+        let bench = Bench::new(&candidates, &unit, NoisePrior { freedom: 10.0, level: 1.0 }, 1.0, &[]);
+        assert_eq!(bench.power(&[6]), Power { least: None, alike: None });
+    }
+
+    #[test]
+    fn quantiles_and_squares_are_those_of_the_tables() {
+        assert!((normal_quantile(0.975) - 1.959_963_985).abs() < 1e-8);
+        assert!((chi_square(10.0, 1.644_853_627) - 18.307).abs() < 0.05);
+        assert_eq!(chi_square(0.0, 1.0), 0.0);
+    }
 }

@@ -89,7 +89,7 @@ fn readings(label: &str, off: impl Fn(&Arm, &[f64], &[i8], usize, f64) -> f64) -
 
 fn diagnosed(arm: &Arm, rows: &[Measurement], without: Vec<Kind>) -> Diagnosis {
     let rows: Vec<&Measurement> = rows.iter().collect();
-    diagnose(arm, &sensor(), &rows, &Options { noise: NoiseSource::Declared, without }).unwrap()
+    diagnose(arm, &sensor(), &rows, &Options { noise: NoiseSource::Declared, without, only: None }).unwrap()
 }
 
 #[test]
@@ -155,7 +155,7 @@ fn a_fault_that_has_no_name_is_unknown() {
 #[test]
 fn too_few_readings_are_refused_and_swapped_joints_are_said() {
     let (arm, mut rows) = readings("test/bad", |_, _, _, _, _| 0.0);
-    let options = Options { noise: NoiseSource::Declared, without: Vec::new() };
+    let options = Options { noise: NoiseSource::Declared, without: Vec::new(), only: None };
     let few: Vec<&Measurement> = rows[..5].iter().collect();
     assert!(diagnose(&arm, &sensor(), &few, &options).unwrap_err().to_string().contains("at least 6"));
     let same = rows[0].clone();

@@ -9,7 +9,7 @@ use super::outcome::{
     Residual, Undetectable, Unknown, Verdict,
 };
 use super::parameters::parameters;
-use super::power::{Power, power};
+use super::power::Bench;
 use super::{Analysis, mean_sigma};
 use crate::effects::signature::shape::Shape;
 use crate::effects::{Kind, Level, Location};
@@ -458,24 +458,24 @@ fn confusion(analysis: &Analysis<'_>) -> Vec<Vec<Candidate>> {
 
 /// What would show from which magnitude on, and the share of kinds and places that would show at a realistic one.
 fn detectability(analysis: &Analysis<'_>, noise: f64) -> (Vec<Undetectable>, Vec<Undetectable>, f64) {
+    use rayon::prelude::*;
     let candidates = analysis.candidates;
-    let (mut undetectable, mut detectable) = (Vec::new(), Vec::new());
-    let mut done: Vec<Claim> = Vec::new();
-    let (mut seen, mut all) = (0.0, 0.0);
+    let mut claims: Vec<(Kind, Claim, Vec<usize>)> = Vec::new();
     for number in 0..candidates.hypotheses.len() {
-        let hypothesis = &candidates.hypotheses[number];
         let this = claim(analysis, number);
-        let Some(kind) = hypothesis.kind.filter(|_| !done.contains(&this)) else {
-            continue;
-        };
-        done.push(this);
-        // Of several variants the one that shows best.
-        let (which, power) = (number..candidates.hypotheses.len())
-            .filter(|other| claim(analysis, *other) == this)
-            .map(|other| (other, power(candidates, analysis.surviving, noise, other)))
-            .min_by(|a, b| a.1.least.unwrap_or(f64::INFINITY).total_cmp(&b.1.least.unwrap_or(f64::INFINITY)))
-            .unwrap_or((number, Power { least: None, alike: None }));
-        let place = Place { time_s: None, ..place(analysis, which) };
+        match (claims.iter_mut().find(|(_, known, _)| *known == this), this.0) {
+            (Some((_, _, variants)), _) => variants.push(number),
+            (None, Some(kind)) => claims.push((kind, this, vec![number])),
+            (None, None) => {}
+        }
+    }
+    let bench = Bench::new(candidates, analysis.surviving, analysis.noise, noise, &analysis.found.best.members);
+    let powers: Vec<_> = claims.par_iter().map(|(_, _, variants)| bench.power(variants)).collect();
+    let (mut undetectable, mut detectable) = (Vec::new(), Vec::new());
+    let (mut seen, mut all) = (0.0, 0.0);
+    for ((kind, _, variants), power) in claims.into_iter().zip(powers) {
+        let hypothesis = &candidates.hypotheses[variants[0]];
+        let place = Place { time_s: None, ..place(analysis, variants[0]) };
         let largest = hypothesis.range[1];
         all += 1.0;
         let value = power.least.filter(|least| least.is_finite() && *least < 1e4 * largest);

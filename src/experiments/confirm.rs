@@ -536,7 +536,7 @@ mod tests {
     }
 
     fn diagnosed(scene: &Scene, rows: &[&Measurement]) -> Diagnosis {
-        let options = Options { noise: NoiseSource::Declared, without: Vec::new() };
+        let options = Options { noise: NoiseSource::Declared, without: Vec::new(), only: None };
         diagnose(&scene.arm, &scene.sensor, rows, &options).unwrap()
     }
 

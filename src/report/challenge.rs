@@ -1,7 +1,7 @@
 //! The score of a diagnosis: tables for people, one for CSV, and the reliability plot.
 
 use super::table;
-use crate::experiments::challenge::score::{Confusion, Score, Single};
+use crate::experiments::challenge::score::{Confusion, LAMBDA, Score, Single};
 use crate::figure::{Axis, Colour, Estimate, Figure, Kind, Panel, Series};
 
 /// `97 % (31/32)`.
@@ -103,6 +103,23 @@ pub fn score(score: &Score, who: &str, seconds: &[f64]) -> String {
         .iter()
         .map(|row| vec![row.lambda.clone(), row.given.to_string(), percent(row.median_error), share(row.covered, row.intervals)]);
     text.push_str(&table(&["magnitude, found effects", "given", "median error", "95 % intervals cover"], sizes.collect()));
+    if !score.changes.is_empty() {
+        text.push('\n');
+        let rows = score
+            .changes
+            .iter()
+            .map(|row| vec![row.kind.clone(), row.given.to_string(), percent(row.median_error), percent(row.largest_of_90)]);
+        let header = ["time of named steps", "given", "median error, of the session", "90 % below"];
+        text.push_str(&table(&header, rows.collect()));
+    }
+    for bin in [3, 2] {
+        let (_, name) = LAMBDA[bin];
+        if let Some(matrix) = matrix(&score.confusion, name) {
+            text.push_str(&format!(
+                "\nOne effect with λ {name}: cases by what is there (rows) and what is named (columns)\n{matrix}"
+            ));
+        }
+    }
     let calibration = &score.calibration;
     let number = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| format!("{value:.3}"));
     text.push_str(&format!(
@@ -111,6 +128,17 @@ pub fn score(score: &Score, who: &str, seconds: &[f64]) -> String {
         number(calibration.ece),
         number(calibration.brier)
     ));
+    if let Some(closure) = &score.closure {
+        text.push_str(&format!(
+            "Held-out gap closed over what one closes who knows the effects: median {}, mean {}, 90 % or more in {} ({} cases, each \
+             effect known with λ ≥ 40; {} more in which who knows closes nothing).\n",
+            percent(closure.median),
+            percent(closure.mean),
+            share(closure.nearly_all, closure.cases),
+            closure.cases,
+            closure.nothing_to_close
+        ));
+    }
     if !seconds.is_empty() {
         let mut sorted = seconds.to_vec();
         sorted.sort_by(f64::total_cmp);
@@ -125,6 +153,37 @@ pub fn score(score: &Score, who: &str, seconds: &[f64]) -> String {
          confidently: 0.95 or more. Right place: of those with the right kind. Shares are of the cases of their row.\n",
     );
     text
+}
+
+/// Which kind was named for which in cases whose λ is in the bin `lambda`; kinds have numbers so that columns are narrow.
+fn matrix(rows: &[Confusion], lambda: &str) -> Option<String> {
+    let rows: Vec<&Confusion> = rows.iter().filter(|row| row.lambda == lambda).collect();
+    let mut names: Vec<&str> = rows.iter().flat_map(|row| [row.truth.as_str(), row.named.as_str()]).collect();
+    names.sort_unstable();
+    names.dedup();
+    // What is no kind stands last, in words.
+    let (mut kinds, others): (Vec<&str>, Vec<&str>) =
+        names.into_iter().partition(|name| !["unknown", "a set", "nothing"].contains(name));
+    let numbered = kinds.len();
+    kinds.extend(others);
+    let mut header = vec!["there".to_owned()];
+    header
+        .extend(kinds.iter().enumerate().map(|(at, name)| if at < numbered { (at + 1).to_string() } else { (*name).to_owned() }));
+    header.push("cases".to_owned());
+    let count = |truth: &str, named: &str| {
+        rows.iter().filter(|row| row.truth == truth && row.named == named).map(|row| row.cases).sum::<usize>()
+    };
+    let lines = kinds[..numbered].iter().enumerate().map(|(at, truth)| {
+        let mut line = vec![format!("{} {truth}", at + 1)];
+        line.extend(kinds.iter().map(|named| match count(truth, named) {
+            0 => "·".to_owned(),
+            cases => cases.to_string(),
+        }));
+        line.push(kinds.iter().map(|named| count(truth, named)).sum::<usize>().to_string());
+        line
+    });
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    (numbered > 0).then(|| table(&header, lines.collect()))
 }
 
 /// Which kind was named for which, for CSV.
@@ -163,5 +222,17 @@ pub fn figure(score: &Score) -> Figure {
         .with(Series::new("right kind", Kind::Bars(shares(&|row| row.right))))
         .with(Series::new("abstained", Kind::Bars(shares(&|row| row.abstained))))
         .with(Series::new("wrong kind", Kind::Bars(shares(&|row| row.wrong))));
-    Figure::new("Score of the diagnosis", 2).with(reliability).with(right)
+    let stated = calibration.reliability.iter();
+    let names = stated.clone().map(|bin| {
+        let low = ((bin.stated * 10.0) as usize).min(9);
+        format!("{:.1}–{:.1}", low as f64 / 10.0, (low + 1) as f64 / 10.0)
+    });
+    let counts = |get: &dyn Fn(f64, f64) -> f64| {
+        stated.clone().map(|bin| get(bin.statements as f64, bin.statements as f64 * bin.true_share)).collect::<Vec<f64>>()
+    };
+    let counted = Panel::new(Axis::categories("stated probability", names), Axis::linear("statements").zero())
+        .titled("How often each probability is stated")
+        .with(Series::new("stated", Kind::Bars(counts(&|all, _| all))))
+        .with(Series::new("true", Kind::Bars(counts(&|_, right| right))));
+    Figure::new("Score of the diagnosis", 2).with(reliability).with(counted).with(right)
 }

@@ -5,6 +5,7 @@ pub mod confirm;
 pub mod diagnosis;
 pub mod effects;
 pub mod findings;
+pub mod power;
 pub mod sweep;
 
 mod advice;

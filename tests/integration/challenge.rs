@@ -254,3 +254,32 @@ fn what_cannot_be_drawn_is_refused() {
     let ran = kincal(folder.path(), &["challenge", "score", "nowhere"]).ends(2);
     assert!(ran.stderr.contains("nowhere/manifest.json"), "{}", ran.stderr);
 }
+
+#[test]
+fn stated_magnitudes_are_checked_the_same_way_every_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
+    let arguments = ["challenge", "power", "--kinds", "backlash:3", "--poses", "30", "--sets", "2", "--trials", "4"];
+    let arguments = [&arguments[..], &["--levels", "4,0.2", "--json"]].concat();
+    let first = kincal(&a, &arguments).ends(0).json();
+    let again = kincal(&b, &[&arguments[..], &["--threads", "1"]].concat()).ends(0).json();
+    assert_eq!(first["power"], again["power"]);
+    assert_eq!(names(&a), ["power.json", "power.png", "power.svg"]);
+    let curve = &first["power"]["curves"][0];
+    let levels = curve["levels"].as_array().unwrap();
+    let named: Vec<f64> = levels.iter().map(|level| number(level, "/named")).collect();
+    assert_eq!(named, [0.0, 4.0]);
+    assert!((number(&levels[1], "/magnitude") / number(curve, "/stated") - 4.0).abs() < 1e-9);
+    for (wrong, says) in [
+        (["--kinds", "gremlins"], "no such kind"),
+        (["--kinds", "backlash:9"], "can be at"),
+        (["--trials", "0"], "--trials 0"),
+        (["--sets", "0"], "--sets 0"),
+        (["--levels", "1"], "--levels"),
+        (["--noise", "-1"], "--noise -1"),
+        (["--poses", "3"], "--poses 3"),
+    ] {
+        let ran = kincal(&a, &[&["challenge", "power"], &wrong[..]].concat());
+        assert!(ran.ends(2).stderr.contains(says), "{wrong:?}");
+    }
+}

@@ -22,7 +22,7 @@ use crate::seed::{Stream, hidden_key, hidden_stream};
 use crate::session::{SessionError, start_event};
 
 /// Half width of the errors of length parameters, m, and of angle parameters, rad.
-const PARAMETER_ERRORS: [f64; 2] = [1e-3, 0.2 * std::f64::consts::PI / 180.0];
+pub(super) const PARAMETER_ERRORS: [f64; 2] = [1e-3, 0.2 * std::f64::consts::PI / 180.0];
 /// Heavy tails: so many of the readings have a noise so many times the declared one.
 const TAILS: Tails = Tails { share: 0.05, factor: 5.0 };
 /// Noise that is larger than declared is so many times as large.
@@ -77,6 +77,9 @@ pub struct CaseTruth {
     pub noise: TrueNoise,
     /// ‖P⊥ s‖²/σ² of all effects together; absent where nothing could be seen.
     pub lambda: Option<f64>,
+    /// From the start to the last reading, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub session_s: Option<f64>,
     /// Name, true value (SI) of every parameter.
     pub parameters: Vec<(String, f64)>,
     /// Key of the hidden draws.
@@ -100,6 +103,9 @@ pub struct TrueEffect {
     pub lambda: Option<f64>,
     /// ‖s‖²/σ².
     pub signal: Option<f64>,
+    /// Share of the session after which a step happens.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub after: Option<f64>,
     /// Everything that it is.
     pub detail: String,
 }
@@ -266,6 +272,10 @@ pub fn measured(public: &Public, hidden: &Hidden, index: usize) -> Result<(Vec<M
             unit: sort.unit().to_owned(),
             lambda: None,
             signal: None,
+            after: match effect {
+                Effect::BaseStep { after, .. } | Effect::ToolStep { after, .. } => Some(*after),
+                _ => None,
+            },
             detail: format!("{effect:?}"),
         })
         .collect();
@@ -291,6 +301,7 @@ pub fn measured(public: &Public, hidden: &Hidden, index: usize) -> Result<(Vec<M
         effects,
         noise: hidden.noise,
         lambda,
+        session_s: planned.last().map(|last| last.time_s),
         parameters,
         key: injected.seed.clone(),
     };

@@ -56,6 +56,12 @@ pub enum ChallengeError {
         /// What to do.
         remedy: &'static str,
     },
+    /// A cell could not be diagnosed.
+    #[error("a simulated cell cannot be diagnosed: {reason}")]
+    Diagnosis {
+        /// Why, with what to do.
+        reason: String,
+    },
     /// A challenge is there already.
     #[error("{} holds a challenge already; choose another folder with --out", path.display())]
     Occupied {

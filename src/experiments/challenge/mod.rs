@@ -5,6 +5,7 @@
 
 pub mod case;
 pub mod folder;
+pub mod power;
 pub mod score;
 pub mod verdict;
 

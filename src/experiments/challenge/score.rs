@@ -8,7 +8,7 @@
 use serde::Serialize;
 
 use super::case::{CaseTruth, TrueEffect};
-use super::verdict::{NamedEffect, Place, Verdict, level};
+use super::verdict::{Gap, NamedEffect, Place, Verdict, level};
 
 /// From this probability on an effect counts as named.
 const NAMED: f64 = 0.5;
@@ -47,6 +47,10 @@ pub struct Score {
     pub calibration: Calibration,
     /// Magnitudes of effects whose kind and place are right.
     pub magnitudes: Vec<Magnitudes>,
+    /// Error in time of the steps that are named, by kind.
+    pub changes: Vec<Changes>,
+    /// What the verdicts close of the held-out gap over what one closes who knows the truth; where that was asked for.
+    pub closure: Option<Closure>,
     /// Which kind was named for which, by λ: truth, bin, named (or `nothing`, `unknown`, `a set`), cases.
     pub confusion: Vec<Confusion>,
 }
@@ -175,6 +179,35 @@ pub struct Magnitudes {
     pub covered: usize,
 }
 
+/// When a step happened, of those named.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Changes {
+    /// Kind.
+    pub kind: String,
+    /// Times given.
+    pub given: usize,
+    /// Median of |found − true| over the session.
+    pub median_error: Option<f64>,
+    /// What nine of ten errors do not exceed.
+    pub largest_of_90: Option<f64>,
+}
+
+/// What is closed of the held-out gap, over what one closes who knows which effects are there: cases with known effects only, each
+/// with λ ≥ 40.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Closure {
+    /// Cases in which who knows closes something.
+    pub cases: usize,
+    /// Cases in which that closes nothing.
+    pub nothing_to_close: usize,
+    /// Of (geometry² − explained²) of the verdict over that of who knows.
+    pub median: Option<f64>,
+    /// Of the same.
+    pub mean: Option<f64>,
+    /// Cases with 0.9 or more.
+    pub nearly_all: usize,
+}
+
 /// How often a kind was taken for another.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct Confusion {
@@ -258,6 +291,8 @@ pub fn score(truths: &[CaseTruth], verdicts: &[Verdict], withheld: &[String]) ->
         foreign: of_foreign(truths, verdicts, &foreign),
         calibration: calibration(truths, verdicts, &foreign),
         magnitudes: magnitudes(truths, verdicts),
+        changes: changes(truths, verdicts),
+        closure: None,
         confusion: confusion(truths, verdicts),
     }
 }
@@ -417,15 +452,70 @@ fn magnitudes(truths: &[CaseTruth], verdicts: &[Verdict]) -> Vec<Magnitudes> {
         .zip(found)
         .map(|(name, (mut errors, intervals, covered))| {
             errors.sort_by(f64::total_cmp);
-            let middle = errors.len() / 2;
-            let median_error = match errors.len() {
-                0 => None,
-                odd if odd % 2 == 1 => Some(errors[middle]),
-                _ => Some(0.5 * (errors[middle - 1] + errors[middle])),
-            };
+            let median_error = median(&errors);
             Magnitudes { lambda: name.to_owned(), given: errors.len(), median_error, intervals, covered }
         })
         .collect()
+}
+
+/// The value in the middle of sorted ones.
+fn median(sorted: &[f64]) -> Option<f64> {
+    let middle = sorted.len() / 2;
+    match sorted.len() {
+        0 => None,
+        odd if odd % 2 == 1 => Some(sorted[middle]),
+        _ => Some(0.5 * (sorted[middle - 1] + sorted[middle])),
+    }
+}
+
+fn changes(truths: &[CaseTruth], verdicts: &[Verdict]) -> Vec<Changes> {
+    let mut errors = std::collections::BTreeMap::<&str, Vec<f64>>::new();
+    for (truth, verdict) in truths.iter().zip(verdicts) {
+        let Some(session_s) = truth.session_s.filter(|session_s| *session_s > 0.0) else { continue };
+        for effect in &truth.effects {
+            let claim = named(verdict).into_iter().find(|claim| is(claim, effect));
+            if let (Some(after), Some(time_s)) = (effect.after, claim.and_then(|claim| claim.location.time_s)) {
+                errors.entry(&effect.kind).or_default().push((time_s / session_s - after).abs());
+            }
+        }
+    }
+    errors
+        .into_iter()
+        .map(|(kind, mut errors)| {
+            errors.sort_by(f64::total_cmp);
+            let nine = (9 * errors.len()).div_ceil(10).saturating_sub(1);
+            Changes {
+                kind: kind.to_owned(),
+                given: errors.len(),
+                median_error: median(&errors),
+                largest_of_90: errors.get(nine).copied(),
+            }
+        })
+        .collect()
+}
+
+/// Whether a case is one of [`Closure`].
+#[must_use]
+pub fn closes(truth: &CaseTruth, withheld: &[String]) -> bool {
+    let known = |effect: &TrueEffect| effect.known && !withheld.contains(&effect.kind);
+    let visible = |effect: &TrueEffect| bin(effect.lambda) == 3;
+    !truth.effects.is_empty() && truth.effects.iter().all(|effect| known(effect) && visible(effect))
+}
+
+/// What is closed of the gap by each verdict, beside what one closes who knows the truth.
+#[must_use]
+pub fn closure(pairs: &[(Gap, Gap)]) -> Closure {
+    let closed = |gap: &Gap| gap.geometry_rms_m * gap.geometry_rms_m - gap.explained_rms_m * gap.explained_rms_m;
+    let mut shares: Vec<f64> =
+        pairs.iter().filter(|(_, best)| closed(best) > 0.0).map(|(own, best)| closed(own) / closed(best)).collect();
+    shares.sort_by(f64::total_cmp);
+    Closure {
+        cases: shares.len(),
+        nothing_to_close: pairs.len() - shares.len(),
+        median: median(&shares),
+        mean: (!shares.is_empty()).then(|| shares.iter().sum::<f64>() / shares.len() as f64),
+        nearly_all: shares.iter().filter(|share| **share >= 0.9).count(),
+    }
 }
 
 fn confusion(truths: &[CaseTruth], verdicts: &[Verdict]) -> Vec<Confusion> {
@@ -481,13 +571,22 @@ mod tests {
             unit: "m".to_owned(),
             lambda: Some(lambda),
             signal: Some(2.0 * lambda),
+            after: None,
             detail: String::new(),
         }
     }
 
     fn case(effects: Vec<TrueEffect>) -> CaseTruth {
         let noise = TrueNoise { declared_m: 20e-6, factor: 1.0, tails: None };
-        CaseTruth { file: String::new(), effects, noise, lambda: None, parameters: Vec::new(), key: String::new() }
+        CaseTruth {
+            file: String::new(),
+            effects,
+            noise,
+            lambda: None,
+            session_s: Some(600.0),
+            parameters: Vec::new(),
+            key: String::new(),
+        }
     }
 
     fn truths() -> Vec<CaseTruth> {
@@ -538,7 +637,7 @@ mod tests {
     fn wrong_names_are_counted_where_they_belong() {
         let claim = |kind: &str, joint, probability| NamedEffect {
             kind: kind.to_owned(),
-            location: Place { level: "joint".to_owned(), index: Some(joint) },
+            location: Place { level: "joint".to_owned(), index: Some(joint), time_s: None },
             probability,
             magnitude: Some(Magnitude { value: Some(-3e-5), unit: Some("m".to_owned()), ci95: Some([-2.5e-5, -1e-5]) }),
         };
@@ -571,6 +670,37 @@ mod tests {
         let found = score.magnitudes.last().unwrap();
         assert_eq!((found.given, found.intervals, found.covered), (1, 1, 1));
         assert!((found.median_error.unwrap() - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn steps_are_judged_by_their_time() {
+        let mut truths: Vec<CaseTruth> = [0.25, 0.5, 0.75].map(|_| case(vec![effect("base_step", 1, 90.0)])).into();
+        let mut verdicts = Vec::new();
+        for (truth, (after, error)) in truths.iter_mut().zip([(0.25, 0.01), (0.5, -0.05), (0.75, 0.02)]) {
+            truth.effects[0].after = Some(after);
+            let mut verdict = oracle(truth, &[]);
+            assert_eq!(verdict.effects[0].location.time_s, Some(600.0 * after));
+            verdict.effects[0].location.time_s = Some(600.0 * (after + error));
+            verdicts.push(verdict);
+        }
+        let changes = score(&truths, &verdicts, &[]).changes;
+        assert_eq!((changes.len(), changes[0].given), (1, 3));
+        assert!((changes[0].median_error.unwrap() - 0.02).abs() < 1e-12);
+        assert!((changes[0].largest_of_90.unwrap() - 0.05).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_gap_is_measured_by_who_knows_the_truth() {
+        let gap = |before: f64, after: f64| Gap { geometry_rms_m: before, explained_rms_m: after };
+        let best = gap(5.0, 3.0);
+        let found =
+            closure(&[(gap(5.0, 3.0), best), (gap(5.0, 5.0), best), (gap(5.0, 17.0_f64.sqrt()), best), (best, gap(3.0, 4.0))]);
+        assert_eq!((found.cases, found.nothing_to_close, found.nearly_all), (3, 1, 1));
+        assert!((found.median.unwrap() - 0.5).abs() < 1e-12 && (found.mean.unwrap() - 0.5).abs() < 1e-12);
+        let truths = truths();
+        let closing: Vec<bool> = truths.iter().map(|truth| closes(truth, &[])).collect();
+        assert_eq!(closing, [true, false, true, false, false, false]);
+        assert!(!closes(&truths[0], &["radial_clearance".to_owned()]));
     }
 
     #[test]

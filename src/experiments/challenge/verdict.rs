@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::case::CaseTruth;
+use super::case::{CaseTruth, TrueEffect};
 use super::folder::Case;
 
 /// A diagnosis. Unknown fields are left out.
@@ -19,6 +19,18 @@ pub struct Verdict {
     /// Whether something is left that no effect explains.
     #[serde(default)]
     pub unknown: Unknown,
+    /// Errors on held-out poses.
+    #[serde(default)]
+    pub gap: Option<Gap>,
+}
+
+/// 3-D position RMS on held-out poses, m.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Gap {
+    /// Geometry fitted.
+    pub geometry_rms_m: f64,
+    /// Geometry and effects.
+    pub explained_rms_m: f64,
 }
 
 /// An effect that is named.
@@ -48,6 +60,9 @@ pub struct Place {
     /// From 1.
     #[serde(default)]
     pub index: Option<usize>,
+    /// Of a step, s since the first reading's clock began.
+    #[serde(default)]
+    pub time_s: Option<f64>,
 }
 
 /// A magnitude with its interval.
@@ -100,7 +115,13 @@ pub fn nothing(_: &Case) -> Result<serde_json::Value, String> {
 /// The verdict that nothing is wrong.
 #[must_use]
 pub fn nothing_at_all() -> Verdict {
-    Verdict { verdict: "no_gap".to_owned(), effects: Vec::new(), confusion_sets: Vec::new(), unknown: Unknown::default() }
+    Verdict {
+        verdict: "no_gap".to_owned(),
+        effects: Vec::new(),
+        confusion_sets: Vec::new(),
+        unknown: Unknown::default(),
+        gap: None,
+    }
 }
 
 /// What whoever knows the truth would say: every known effect at its place with its magnitude, and that the others are unknown.
@@ -110,7 +131,7 @@ pub fn oracle(truth: &CaseTruth, withheld: &[String]) -> Verdict {
     let effects: Vec<NamedEffect> = named
         .map(|effect| NamedEffect {
             kind: effect.kind.clone(),
-            location: Place { level: level(effect.location.level), index: effect.location.index },
+            location: Place { level: level(effect.location.level), index: effect.location.index, time_s: change(effect, truth) },
             probability: 1.0,
             magnitude: Some(Magnitude {
                 value: Some(effect.magnitude),
@@ -125,7 +146,12 @@ pub fn oracle(truth: &CaseTruth, withheld: &[String]) -> Verdict {
         (false, true) => "no_gap",
         (false, false) => "explained",
     };
-    Verdict { verdict: verdict.to_owned(), effects, confusion_sets: Vec::new(), unknown: Unknown { present } }
+    Verdict { verdict: verdict.to_owned(), effects, confusion_sets: Vec::new(), unknown: Unknown { present }, gap: None }
+}
+
+/// When a step happens, s.
+fn change(effect: &TrueEffect, truth: &CaseTruth) -> Option<f64> {
+    Some(effect.after? * truth.session_s?)
 }
 
 /// The name of a level.
