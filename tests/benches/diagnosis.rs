@@ -34,7 +34,7 @@ fn readings(poses: usize) -> (Scene, Vec<Measurement>) {
 }
 
 fn options() -> Options {
-    Options { noise: NoiseSource::Declared, without: Vec::new() }
+    Options { noise: NoiseSource::Declared, without: Vec::new(), only: None }
 }
 
 /// The whole diagnosis. Marks: 1 s for 60 readings, 10 s for 600, on two cores.
