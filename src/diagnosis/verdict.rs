@@ -343,12 +343,13 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
     } else {
         Verdict::NotDetectable
     };
-    let next_measurements = next(analysis, &confusion_sets, &undetectable, verdict);
+    let next_measurements = next(analysis, &confusion_sets, &undetectable, &detectable, verdict);
     let mut sentence = sentence(verdict, &effects, &confusion_sets, &unknown, &gap, share);
     if verdict == Verdict::NoGap {
         let seen = |kind: &str| detectable.iter().any(|one| one.kind == kind);
         let mut blind: Vec<String> =
             undetectable.iter().filter(|one| !seen(&one.kind)).map(|one| one.kind.replace('_', " ")).collect();
+        blind.sort();
         blind.dedup();
         if !blind.is_empty() {
             sentence.push_str(&format!(" Nowhere to be seen would have been: {}.", blind.join(", ")));
@@ -616,7 +617,13 @@ fn sentence(verdict: Verdict, effects: &[Effect], sets: &[Vec<Candidate>], unkno
 }
 
 /// What to measure next.
-fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], blind: &[Undetectable], verdict: Verdict) -> Vec<String> {
+fn next(
+    analysis: &Analysis<'_>,
+    sets: &[Vec<Candidate>],
+    blind: &[Undetectable],
+    seen: &[Undetectable],
+    verdict: Verdict,
+) -> Vec<String> {
     let mut said: Vec<String> = Vec::new();
     let mut say = |text: &str| {
         if !said.iter().any(|known| known == text) {
@@ -663,10 +670,11 @@ fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], blind: &[Undetectable]
             ));
         }
     }
-    if !columns.temperature {
+    let thermal = [Kind::LinkThermalGrowth, Kind::JointThermalDrift];
+    if !seen.iter().any(|one| thermal.iter().any(|kind| one.kind == kind.name())) {
         let known = analysis.measurements.iter().any(|row| row.ambient_c.is_some() || !row.temperatures_c.is_empty());
         say(if known {
-            "thermal effects could not show, for the temperature never changed: let the arm warm up and cool down in one session"
+            "thermal effects could not show, for the temperature hardly changed: let the arm warm up and cool down in one session"
         } else {
             "thermal effects could not show: record temperatures (temp_ambient_c, temp1_c, …) while the arm warms up and cools down"
         });
