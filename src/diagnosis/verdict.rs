@@ -40,6 +40,10 @@ fn blocked(held_out: &HeldOut) -> Option<Blocked> {
     })
 }
 
+/// What tells linear from saturating effects of load.
+const PAYLOADS: &str =
+    "linear and saturating effects of load look alike under one payload: the same configurations with two or three payloads";
+
 /// What a hypothesis claims: its kind (or none) and its place.
 type Claim = (Option<Kind>, Location);
 
@@ -599,7 +603,15 @@ fn sentence(verdict: Verdict, effects: &[Effect], sets: &[Vec<Candidate>], unkno
                 .take(3)
                 .map(|one| format!("{} ({:.0} %)", of_place(&one.kind, &one.location), 100.0 * one.probability))
                 .collect();
-            if candidates.is_empty() {
+            if effects.len() > 1 {
+                format!(
+                    "Several causes, not all settled (below {:.0} %): {}; held-out RMS {} with geometry, {} with the causes.",
+                    100.0 * SURE,
+                    list(effects),
+                    um(gap.geometry_rms_m),
+                    um(gap.explained_rms_m)
+                )
+            } else if candidates.is_empty() {
                 format!("Something is there that is not settled: {}.", list(effects))
             } else {
                 format!("Something is there, and these readings cannot tell which it is: {}.", candidates.join(" or "))
@@ -637,7 +649,7 @@ fn next(
             say("compliance or bending: load the arm sideways, tilt the base, or put a target on a link in between");
         }
         if (has("link_bending") && has("tilt_clearance")) || has("joint_compliance") || has("gravity_lost_motion") {
-            say("linear or saturating: the same configurations with two or three payloads");
+            say(PAYLOADS);
         }
         if has("link_thermal_growth") || has("joint_thermal_drift") || has("base_drift") {
             say("temperature or time: heat and cool in one session, so that temperatures return while time goes on");
