@@ -1,6 +1,7 @@
 //! A diagnosis for people: the verdict in a sentence, the waterfall, the causes, where, and what to measure next.
 
 use super::{number, table};
+use crate::diagnosis::held_out::Block;
 use crate::diagnosis::outcome::{Candidate, Diagnosis, Map, NoiseSource, Place};
 use crate::effects::Level;
 
@@ -73,6 +74,19 @@ fn waterfall(diagnosis: &Diagnosis) -> String {
     rows.push(vec![format!("noise floor ({source})"), um(gap.noise_rms_m), bar(gap.noise_rms_m)]);
     let mut text = table(&[&format!("held out, {} folds", gap.folds), "RMS, µm", ""], rows);
     text.push('\n');
+    for other in &gap.blocked {
+        let by = match other.by {
+            Block::Region => "regions",
+            Block::Payload => "payloads",
+            Block::Session => "sessions",
+        };
+        text.push_str(&format!(
+            "Whole {by} left out ({} folds): geometry {} µm, with what each fold chose {} µm.\n",
+            other.folds,
+            um(other.geometry_rms_m),
+            um(other.explained_rms_m)
+        ));
+    }
     if let Some(closed) = gap.gap_closed {
         let interval = gap
             .gap_closed_ci95
