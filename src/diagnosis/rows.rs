@@ -22,7 +22,7 @@ const FREE_TURN: f64 = 50e-3;
 const STEPS: usize = 30;
 
 /// Why nothing can be diagnosed.
-#[derive(Debug, thiserror::Error, PartialEq)]
+#[derive(Clone, Debug, thiserror::Error, PartialEq)]
 pub enum DiagnosisError {
     /// Too few rows.
     #[error("{found} rows at {different} different configurations; a diagnosis needs at least {needed} different ones")]

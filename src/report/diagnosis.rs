@@ -7,22 +7,7 @@ use crate::effects::Level;
 /// The whole report.
 #[must_use]
 pub fn text(diagnosis: &Diagnosis) -> String {
-    let mut text = format!("{}\n\n", diagnosis.sentence);
-    text.push_str(&waterfall(diagnosis));
-    if !diagnosis.effects.is_empty() {
-        text.push('\n');
-        text.push_str(&causes(diagnosis));
-        text.push('\n');
-    }
-    for set in &diagnosis.confusion_sets {
-        text.push_str("\nThese cannot be told apart:\n");
-        text.push_str(&candidates(set));
-        text.push('\n');
-    }
-    if diagnosis.unknown.present {
-        let place = diagnosis.unknown.r#where.clone().unwrap_or_default();
-        text.push_str(&format!("\nUnknown: {place} (p = {}).\n", number(diagnosis.unknown.p_value)));
-    }
+    let mut text = answer(diagnosis);
     text.push_str("\nWhat remains along each joint's motion, over its travel (each step two standard errors):\n");
     for map in &diagnosis.maps {
         text.push_str(&format!("  joint {:<2} {}\n", map.joint, picture(map)));
@@ -38,6 +23,28 @@ pub fn text(diagnosis: &Diagnosis) -> String {
     }
     for note in &diagnosis.notes {
         text.push_str(&format!("Note: {note}.\n"));
+    }
+    text
+}
+
+/// The answer alone: the verdict in a sentence, the waterfall, the causes or what cannot be told apart, and what remains unknown.
+#[must_use]
+pub fn answer(diagnosis: &Diagnosis) -> String {
+    let mut text = format!("{}\n\n", diagnosis.sentence);
+    text.push_str(&waterfall(diagnosis));
+    if !diagnosis.effects.is_empty() {
+        text.push('\n');
+        text.push_str(&causes(diagnosis));
+        text.push('\n');
+    }
+    for set in &diagnosis.confusion_sets {
+        text.push_str("\nThese cannot be told apart:\n");
+        text.push_str(&candidates(set));
+        text.push('\n');
+    }
+    if diagnosis.unknown.present {
+        let place = diagnosis.unknown.r#where.clone().unwrap_or_default();
+        text.push_str(&format!("\nUnknown: {place} (p = {}).\n", number(diagnosis.unknown.p_value)));
     }
     text
 }
