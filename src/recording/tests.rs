@@ -231,7 +231,11 @@ fn diagnosis(stream: &mut Stream, readings: usize) -> Diagnosis {
         kind: "backlash".to_owned(),
         location: place(Some(3), None),
         probability: stream.uniform(0.0, 1.0),
-        magnitude: Magnitude { value: stream.uniform(0.0, 1e-3), unit: "rad".to_owned(), ci95: [-0.0, stream.uniform(0.0, 1e-3)] },
+        magnitude: Magnitude {
+            value: stream.uniform(0.0, 1e-3),
+            unit: "rad".to_owned(),
+            ci95: [-0.0, stream.uniform(0.0, 1e-3)],
+        },
         parameters,
         held_out_rms_before_m: stream.uniform(0.0, 1e-3),
         held_out_rms_after_m: stream.uniform(0.0, 1e-3),

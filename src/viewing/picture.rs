@@ -18,6 +18,7 @@ use sha2::{Digest, Sha256};
 use super::body::{Body, point, transform};
 use super::by_joint;
 use super::chart::{self, Series, Unit};
+use super::diagnosis::{self, Sight};
 use super::layout::{self, Camera, Choosing, Parts};
 use super::summary::{Summary, significant};
 use super::viewer::ViewerError;
@@ -50,7 +51,8 @@ const PREDICTED: [u8; 3] = [235, 235, 235];
 const POOR: [u8; 3] = [58, 66, 92];
 const GOOD: [u8; 3] = [104, 160, 214];
 const PERSONAL: [u8; 3] = [96, 112, 140];
-const CURVES: [[u8; 3]; 6] = [AMBER, [110, 170, 230], [90, 200, 170], [200, 130, 220], [230, 120, 120], [170, 180, 120]];
+pub(super) const CURVES: [[u8; 3]; 6] =
+    [AMBER, [110, 170, 230], [90, 200, 170], [200, 130, 220], [230, 120, 120], [170, 180, 120]];
 
 /// Measured points that share an entity: growing entities of this size keep what is sent in proportion to what is measured.
 const BLOCK: usize = 64;
@@ -133,6 +135,9 @@ impl Picture {
         for path in ["errors/position", "errors/attitude"] {
             chart::log_empty(&stream, path)?;
         }
+        if parts.diagnosed {
+            diagnosis::log_empty(&stream)?;
+        }
         Ok(stream)
     }
 
@@ -155,10 +160,14 @@ impl Picture {
         format!("{}-{hex}", self.name)
     }
 
+    fn up(&self) -> nalgebra::Vector3<f64> {
+        let up = -self.body.arm().gravity_in_base;
+        if up.norm() > 1e-9 { up.normalize() } else { nalgebra::Vector3::z() }
+    }
+
     fn camera(&self) -> Camera {
         let size = self.body.stretch;
-        let up = -self.body.arm().gravity_in_base;
-        let up = if up.norm() > 1e-9 { up.normalize() } else { nalgebra::Vector3::z() };
+        let up = self.up();
         let aside = if up.x.abs() < 0.9 { nalgebra::Vector3::x() } else { nalgebra::Vector3::y() };
         let right = (aside - up * up.dot(&aside)).normalize();
         let target = up * 0.25 * size;
@@ -177,6 +186,11 @@ impl Picture {
             Event::Designed(design) => self.designed(stream, design)?,
             Event::Measured(measurement) => self.measured(stream, measurement)?,
             Event::Identified(identified) => self.identified(stream, identified)?,
+            Event::Diagnosed(diagnosis) => {
+                let sight = Sight { stretch: self.body.stretch, up: self.up() };
+                diagnosis::log(stream, diagnosis, sight)?;
+                self.summary.diagnosed(diagnosis::summary(diagnosis));
+            }
             Event::Note(text) => return stream.log("notes", &TextLog::new(text.as_str()).with_level(TextLogLevel::INFO)),
         }
         stream.log("summary", &TextDocument::from_markdown(self.summary.markdown()))
@@ -443,8 +457,7 @@ impl Picture {
 
     /// The scales as labels above the arm.
     fn log_scales(&self, stream: &RecordingStream, scales: &[String]) -> RecordingStreamResult<()> {
-        let camera = self.camera();
-        let up = nalgebra::Vector3::from(camera.up.map(f64::from));
+        let up = self.up();
         let places = (0..scales.len()).map(|row| point(&(up * self.body.stretch * (1.12 - 0.09 * row as f64))));
         let labels = Points3D::new(places)
             .with_labels(scales.iter().map(String::as_str))
@@ -460,7 +473,7 @@ fn length(vector: &[f64]) -> f64 {
 }
 
 /// A length in the unit that reads best: `2 mm`, `20 µm`.
-fn metres(value: f64) -> String {
+pub(super) fn metres(value: f64) -> String {
     let (factor, unit) = match value {
         _ if value >= 1.0 => (1.0, "m"),
         _ if value >= 1e-3 => (1e3, "mm"),
@@ -480,7 +493,7 @@ fn role_colour(role: Role) -> [u8; 3] {
 }
 
 /// The nearest of 1, 2 and 5 times a power of ten.
-fn round(value: f64) -> f64 {
+pub(super) fn round(value: f64) -> f64 {
     let power = libm::pow(10.0, libm::floor(libm::log10(value)));
     let ratio = value / power;
     let nearest = if ratio < 1.5 {
