@@ -42,7 +42,7 @@ pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result
         // That nothing can be said of the rest does not make the calibration a bad one.
         Err(error) => format!("Note: no diagnosis: {error}.\n"),
     };
-    output::show(global, &format!("\n{diagnosed}"))?;
+    output::show(global, &diagnosed)?;
     if let Some(recording) = &recording {
         output::show(
             global,

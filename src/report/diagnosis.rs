@@ -60,6 +60,7 @@ pub(crate) struct Step {
     /// 3-D position RMS on held-out poses, m.
     pub(crate) rms_m: f64,
     /// Position in `effects` of the cause that this step adds.
+    #[cfg_attr(not(feature = "viewer"), expect(dead_code, reason = "text needs no colour"))]
     pub(crate) effect: Option<usize>,
 }
 

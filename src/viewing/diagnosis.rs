@@ -13,10 +13,12 @@ use crate::report::diagnosis as report;
 pub(super) const BOUNDS: [[f64; 2]; 2] = [[-2.0, 182.0], [-8.0, 84.0]];
 /// Names stand left of the bars, which are so long at most.
 const NAMES: f64 = 72.0;
-const LONGEST: f64 = 88.0;
+const LONGEST: f64 = 84.0;
 const HEIGHT: f64 = 80.0;
 /// From one bar to the next, at most.
 const PITCH: f64 = 14.0;
+/// A bar is filled with so many lines: one thick line would have round ends.
+const FILL: usize = 24;
 const TEXT: [u8; 3] = [190, 194, 202];
 const GRID: [u8; 3] = [70, 74, 82];
 const NOMINAL: [u8; 3] = [240, 128, 84];
@@ -37,9 +39,9 @@ fn colour(cause: Option<usize>) -> [u8; 3] {
     cause.map_or(UNNAMED, |cause| CURVES[cause % CURVES.len()])
 }
 
-/// Half way to white: what is left once the cause is taken away.
+/// Most of the way to white: what is left once the cause is taken away.
 fn pale(colour: [u8; 3]) -> [u8; 3] {
-    colour.map(|part| part / 2 + 127)
+    colour.map(|part| part / 4 + 191)
 }
 
 /// A panel that says that there is nothing yet.
@@ -80,7 +82,7 @@ fn log_residuals(stream: &RecordingStream, diagnosis: &Diagnosis, sight: Sight) 
     let size = |share: f64| Radius::new_scene_units((share * sight.stretch) as f32);
     // Below the arm's top, row by row.
     let label = |row: usize, text: String, colour: [u8; 3]| {
-        Points3D::new([point(&(sight.up * sight.stretch * (1.16 - 0.075 * row as f64)))])
+        Points3D::new([point(&(sight.up * sight.stretch * (0.95 - 0.06 * row as f64)))])
             .with_labels([text])
             .with_show_labels(true)
             .with_colors([colour])
@@ -129,15 +131,20 @@ fn log_waterfall(stream: &RecordingStream, diagnosis: &Diagnosis) -> RecordingSt
             _ => EXPLAINED,
         })
         .collect();
-    let bars = steps.iter().enumerate().map(|(row, step)| [[NAMES as f32, y(row)], [x(step.rms_m), y(row)]]);
-    let bars = LineStrips2D::new(bars).with_colors(colours.iter().copied());
-    let thick = Radius::new_scene_units((0.3 * pitch) as f32);
-    stream.log("diagnosis/waterfall/bars", &bars.with_radii([thick]))?;
+    let thick = 0.6 * pitch as f32;
+    let lines = steps.iter().enumerate().flat_map(|(row, step)| {
+        (0..FILL).map(move |line| {
+            let y = y(row) + thick * ((line as f32 + 0.5) / FILL as f32 - 0.5);
+            [[NAMES as f32, y], [x(step.rms_m), y]]
+        })
+    });
+    let bars = LineStrips2D::new(lines).with_colors(colours.iter().flat_map(|colour| [*colour; FILL]));
+    stream.log("diagnosis/waterfall/bars", &bars.with_radii([Radius::new_scene_units(0.6 * thick / FILL as f32)]))?;
 
     // A label stands below its point.
-    let above = (0.25 * pitch + 1.0) as f32;
+    let above = 3.0;
     let names = steps.iter().enumerate().map(|(row, _)| [(NAMES / 2.0 - 2.0) as f32, y(row) - above]);
-    let values = steps.iter().enumerate().map(|(row, step)| [x(step.rms_m) + 10.0, y(row) - above]);
+    let values = steps.iter().enumerate().map(|(row, step)| [x(step.rms_m) + 13.0, y(row) - above]);
     let mut labels: Vec<String> = steps.iter().map(|step| step.name.clone()).collect();
     labels.extend(steps.iter().map(|step| {
         let cut = if step.rms_m > full { "… " } else { "" };
@@ -171,7 +178,7 @@ pub(super) fn summary(diagnosis: &Diagnosis) -> String {
 
 /// The report.
 fn markdown(diagnosis: &Diagnosis) -> String {
-    let mut text = format!("### {}\n{}\n\n", verdict(diagnosis.verdict), diagnosis.sentence);
+    let mut text = format!("### Diagnosis: {}\n{}\n\n", verdict(diagnosis.verdict), diagnosis.sentence);
     if !diagnosis.effects.is_empty() {
         text += &table(&report::CAUSES, &report::causes(diagnosis));
     }

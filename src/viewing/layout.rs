@@ -198,7 +198,11 @@ fn pages(parts: Parts, camera: Camera, joints: usize) -> Node {
         return run;
     }
     let contents = ["/world/base/**", "/world/cell/**", "/world/diagnosis/**"];
-    let residuals = scene("Residuals by cause: geometry alone (strong), with the causes (pale)", &contents, camera);
+    // Nearer than where an arm stands in the picture.
+    let near = |from: f32, to: f32| to + 0.8 * (from - to);
+    let position = std::array::from_fn(|axis| near(camera.position[axis], camera.target[axis]));
+    let closer = Camera { position, ..camera };
+    let residuals = scene("Residuals by cause: geometry alone (strong), with the causes (pale)", &contents, closer);
     let waterfall = drawing("Held-out RMS", "/diagnosis/waterfall/**", diagnosis::BOUNDS);
     let report = view("TextDocument", "Report", &["/diagnosis/report"]);
     let diagnosis = columns(vec![(5.0, residuals), (4.0, rows(vec![(4.0, waterfall), (5.0, report)]))]).named("Diagnosis");
