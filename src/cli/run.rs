@@ -40,7 +40,10 @@ pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result
     let diagnosed = match &run.diagnosis {
         Ok(diagnosis) => report::diagnosis::answer(diagnosis),
         // That nothing can be said of the rest does not make the calibration a bad one.
-        Err(error) => format!("Note: no diagnosis: {error}.\n"),
+        Err(error) => {
+            let error = error.to_string();
+            format!("Note: no diagnosis: {error}{}\n", if error.ends_with('?') { "" } else { "." })
+        }
     };
     output::show(global, &diagnosed)?;
     if let Some(recording) = &recording {
