@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use rerun::{Arrows3D, LineStrips2D, Points2D, Points3D, Radius, RecordingStream, RecordingStreamResult, TextDocument};
 
 use super::body::point;
-use super::picture::{CURVES, metres, round};
+use super::picture::{metres, round};
 use super::summary::significant;
 use crate::diagnosis::outcome::{Diagnosis, Residual, Verdict};
 use crate::report::diagnosis as report;
@@ -25,6 +25,8 @@ const NOMINAL: [u8; 3] = [240, 128, 84];
 const GEOMETRY: [u8; 3] = [176, 188, 204];
 const EXPLAINED: [u8; 3] = [72, 200, 150];
 const NOISE: [u8; 3] = [120, 124, 134];
+/// Of the causes, in turn: none is that of another bar.
+const CAUSES: [[u8; 3]; 6] = [[255, 184, 56], [110, 170, 230], [200, 130, 220], [230, 100, 110], [190, 200, 90], [90, 200, 220]];
 /// Of a reading that no named cause moves.
 const UNNAMED: [u8; 3] = [132, 136, 144];
 
@@ -36,7 +38,7 @@ pub(super) struct Sight {
 }
 
 fn colour(cause: Option<usize>) -> [u8; 3] {
-    cause.map_or(UNNAMED, |cause| CURVES[cause % CURVES.len()])
+    cause.map_or(UNNAMED, |cause| CAUSES[cause % CAUSES.len()])
 }
 
 /// Most of the way to white: what is left once the cause is taken away.
@@ -82,7 +84,7 @@ fn log_residuals(stream: &RecordingStream, diagnosis: &Diagnosis, sight: Sight) 
     let size = |share: f64| Radius::new_scene_units((share * sight.stretch) as f32);
     // Below the arm's top, row by row.
     let label = |row: usize, text: String, colour: [u8; 3]| {
-        Points3D::new([point(&(sight.up * sight.stretch * (0.95 - 0.06 * row as f64)))])
+        Points3D::new([point(&(sight.up * sight.stretch * (0.95 - 0.05 * row as f64)))])
             .with_labels([text])
             .with_show_labels(true)
             .with_colors([colour])
@@ -101,8 +103,10 @@ fn log_residuals(stream: &RecordingStream, diagnosis: &Diagnosis, sight: Sight) 
         stream.log(format!("{path}/before"), &before)?;
         let after = arrows(|one| one.after_m).with_colors([pale(colour(cause))]).with_radii([size(0.0035)]);
         stream.log(format!("{path}/after"), &after)?;
-        let legend = format!("{name}: {} of {} readings", members.len(), residuals.len());
-        stream.log(format!("{path}/legend"), &label(row + 1, legend, colour(cause)))?;
+        if cause.is_some() || !members.is_empty() {
+            let legend = format!("{name}: {} of {} readings", members.len(), residuals.len());
+            stream.log(format!("{path}/legend"), &label(row + 1, legend, colour(cause)))?;
+        }
     }
     Ok(())
 }
@@ -139,7 +143,7 @@ fn log_waterfall(stream: &RecordingStream, diagnosis: &Diagnosis) -> RecordingSt
         })
     });
     let bars = LineStrips2D::new(lines).with_colors(colours.iter().flat_map(|colour| [*colour; FILL]));
-    stream.log("diagnosis/waterfall/bars", &bars.with_radii([Radius::new_scene_units(0.6 * thick / FILL as f32)]))?;
+    stream.log("diagnosis/waterfall/bars", &bars.with_radii([Radius::new_scene_units(0.8 * thick / FILL as f32)]))?;
 
     // A label stands below its point.
     let above = 3.0;

@@ -51,8 +51,7 @@ const PREDICTED: [u8; 3] = [235, 235, 235];
 const POOR: [u8; 3] = [58, 66, 92];
 const GOOD: [u8; 3] = [104, 160, 214];
 const PERSONAL: [u8; 3] = [96, 112, 140];
-pub(super) const CURVES: [[u8; 3]; 6] =
-    [AMBER, [110, 170, 230], [90, 200, 170], [200, 130, 220], [230, 120, 120], [170, 180, 120]];
+const CURVES: [[u8; 3]; 6] = [AMBER, [110, 170, 230], [90, 200, 170], [200, 130, 220], [230, 120, 120], [170, 180, 120]];
 
 /// Measured points that share an entity: growing entities of this size keep what is sent in proportion to what is measured.
 const BLOCK: usize = 64;
