@@ -7,6 +7,9 @@ use crate::cell::{Truth, measure};
 use crate::design::candidates::NothingMeasurable;
 use crate::design::outcome::DesignOutcome;
 use crate::design::{self, DesignError};
+use crate::diagnosis::outcome::{Diagnosis, NoiseSource};
+use crate::diagnosis::rows::DiagnosisError;
+use crate::diagnosis::{self, Options};
 use crate::identification::alignment::{AlignmentError, align};
 use crate::identification::outcome::Identification;
 use crate::identification::{IdentificationError, identify};
@@ -56,11 +59,13 @@ pub struct Run {
     pub measurements: Vec<Measurement>,
     /// The parameters.
     pub identification: Identification,
+    /// What causes the rest, looked for in all readings; why not, where it cannot be said.
+    pub diagnosis: Result<Diagnosis, DiagnosisError>,
     /// What was hidden.
     pub truth: Truth,
 }
 
-/// The whole chain: design, measurement, identification. `scene_toml` is the public part of the scene, for the recording.
+/// The whole chain: design, measurement, identification, diagnosis. `scene_toml` is the public part of the scene, for the recording.
 ///
 /// # Errors
 /// Whatever a step reports.
@@ -69,7 +74,8 @@ pub fn run(scene: &Scene, scene_toml: &str, injected: &Injected, listener: &mut 
     let design = design::design(scene, listener)?;
     let (measurements, truth) = measure_design(scene, injected, &design.configurations, listener)?;
     let identification = identify_and_tell(scene, &measurements, listener)?;
-    Ok(Run { design, measurements, identification, truth })
+    let diagnosis = diagnose_and_tell(scene, &measurements, listener)?;
+    Ok(Run { design, measurements, identification, diagnosis, truth })
 }
 
 /// The first event of every recording.
@@ -197,6 +203,38 @@ pub fn identify_and_tell(
     Ok(identification)
 }
 
+/// How the note of a diagnosis that cannot be made begins; a replay knows by it that one was tried.
+const NO_DIAGNOSIS: &str = "no diagnosis: ";
+
+/// Diagnoses what was measured of the scene's arm, fitted or held out, as `kincal diagnose` does with the recording.
+///
+/// # Errors
+/// If the measurements do not suffice.
+pub fn diagnose(scene: &Scene, measurements: &[Measurement]) -> Result<Diagnosis, DiagnosisError> {
+    let rows: Vec<&Measurement> = measurements.iter().collect();
+    let options = Options { noise: NoiseSource::Declared, without: Vec::new(), only: None };
+    let mut diagnosis = diagnosis::diagnose(&scene.arm, &scene.sensor, &rows, &options)?;
+    diagnosis.notes.extend(scene.urdf_notes.iter().cloned());
+    Ok(diagnosis)
+}
+
+/// Diagnoses and tells the listener. That it cannot be done is a note: the calibration stands without.
+///
+/// # Errors
+/// If the listener fails.
+pub fn diagnose_and_tell(
+    scene: &Scene,
+    measurements: &[Measurement],
+    listener: &mut dyn Listener,
+) -> Result<Result<Diagnosis, DiagnosisError>, ListenerError> {
+    let diagnosis = diagnose(scene, measurements);
+    listener.take(&match &diagnosis {
+        Ok(diagnosis) => Event::Diagnosed(Box::new(diagnosis.clone())),
+        Err(error) => Event::Note(format!("{NO_DIAGNOSIS}{error}")),
+    })?;
+    Ok(diagnosis)
+}
+
 /// Whose recording is replayed.
 #[derive(Clone, Copy, Debug)]
 pub enum Subject<'a> {
@@ -207,7 +245,7 @@ pub enum Subject<'a> {
 }
 
 /// Recomputes what a recording holds and tells it to `listener` in the recorded order: the design from the scene, the
-/// measurements from the physics where `injected` is given (else they are taken as recorded), the identification from these.
+/// measurements from the physics where `injected` is given (else they are taken as recorded), identification and diagnosis from these.
 ///
 /// # Errors
 /// Whatever a step reports.
@@ -269,9 +307,25 @@ pub fn replay(
                     Subject::Real(real) => identify_real(real, measured, listener)?,
                 };
             }
+            Event::Diagnosed(_) => replay_diagnosis(subject, measured.as_deref(), listener)?,
+            Event::Note(note) if note.starts_with(NO_DIAGNOSIS) => {
+                replay_diagnosis(subject, measured.as_deref(), listener)?;
+            }
             // Told again by the step that they are about.
             Event::Note(_) => {}
         }
     }
     Ok(truth)
+}
+
+/// The diagnosis again. Those of real arms are not recorded; where one is, it cannot be recomputed and counts as different.
+fn replay_diagnosis(
+    subject: Subject<'_>,
+    measured: Option<&[Measurement]>,
+    listener: &mut dyn Listener,
+) -> Result<(), ListenerError> {
+    match subject {
+        Subject::Scene(scene) => diagnose_and_tell(scene, measured.unwrap_or_default(), listener).map(|_| ()),
+        Subject::Real(_) => Ok(()),
+    }
 }

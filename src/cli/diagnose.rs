@@ -4,13 +4,15 @@ use anyhow::{Context, bail};
 
 use super::Outcome;
 use super::arguments::{DiagnoseOptions, Global};
+use super::output::Audience;
 use super::{input, output};
 use crate::arm::Arm;
-use crate::diagnosis::outcome::{NoiseSource, Verdict};
+use crate::diagnosis::outcome::{Diagnosis, NoiseSource, Verdict};
 use crate::diagnosis::{self, Options};
 use crate::effects::Kind;
 use crate::experiments::confirm::{Answer, confirm};
 use crate::measurement::{Measurement, Sensor, table};
+use crate::recording::event::{Event, Listener, Start};
 use crate::{report, scene, session};
 
 pub(crate) fn command(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Outcome> {
@@ -27,7 +29,8 @@ pub(crate) fn command(global: &Global, options: &DiagnoseOptions) -> anyhow::Res
     let options_of_diagnosis = Options { noise: subject.noise, without, only: None };
     let mut diagnosis = diagnosis::diagnose(&subject.arm, &subject.sensor, &rows, &options_of_diagnosis)
         .with_context(|| options.input.display().to_string())?;
-    diagnosis.notes.extend(subject.notes);
+    diagnosis.notes.extend(subject.notes.iter().cloned());
+    show(global, options, &subject, &diagnosis)?;
     let confirmation = if options.confirm {
         let confirmation = confirm(&diagnosis, &subject.arm, &subject.sensor, &rows);
         Some(confirmation.with_context(|| options.input.display().to_string())?)
@@ -51,8 +54,27 @@ pub(crate) fn command(global: &Global, options: &DiagnoseOptions) -> anyhow::Res
     })
 }
 
+/// Shows readings and diagnosis in the viewer; nothing is recorded.
+fn show(global: &Global, options: &DiagnoseOptions, subject: &Subject, diagnosis: &Diagnosis) -> anyhow::Result<()> {
+    // A real arm stands somewhere in the measurement frame; where that cannot be fitted, it is drawn at its origin.
+    let placed = subject.start.real.as_ref().and_then(|real| {
+        session::real_arm(real, (subject.arm.clone(), Vec::new()), &subject.measurements).map(|real| real.arm).ok()
+    });
+    let stem = input::input_stem(&options.input, "-diagnosed");
+    let mut audience = Audience::open(global, placed.as_ref().unwrap_or(&subject.arm), None, None, &stem)?;
+    audience.take(&Event::Start(subject.start.clone()))?;
+    for measurement in &subject.measurements {
+        audience.take(&Event::Measured(measurement.clone()))?;
+    }
+    audience.take(&Event::Diagnosed(Box::new(diagnosis.clone())))?;
+    audience.finish()?;
+    Ok(())
+}
+
 /// What is diagnosed.
 struct Subject {
+    /// What a recording of it would begin with.
+    start: Start,
     arm: Arm,
     sensor: Sensor,
     noise: NoiseSource,
@@ -63,17 +85,18 @@ struct Subject {
 fn subject(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Subject> {
     if input::is_recording(&options.input) {
         input::no_robot(&options.robot)?;
-        let (start, measurements) = input::recorded(global, &options.input, options.partial)?;
+        let (recorded, measurements) = input::recorded(global, &options.input, options.partial)?;
+        let start = Start { real: recorded.real, ..session::start_event("diagnose", &recorded.scene) };
         return match &start.real {
             Some(real) => {
                 let (arm, notes) = session::real_robot(&start, real).with_context(|| options.input.display().to_string())?;
                 let sensor = session::real_sensor(real, &measurements);
-                Ok(Subject { arm, sensor, noise: NoiseSource::Declared, measurements, notes })
+                Ok(Subject { start, arm, sensor, noise: NoiseSource::Declared, measurements, notes })
             }
             None => {
                 let scene = scene::parse(&start.scene, &format!("{} (scene)", options.input.display()))?.scene;
                 let noise = NoiseSource::Declared;
-                Ok(Subject { arm: scene.arm, sensor: scene.sensor, noise, measurements, notes: scene.urdf_notes })
+                Ok(Subject { start, arm: scene.arm, sensor: scene.sensor, noise, measurements, notes: scene.urdf_notes })
             }
         };
     }
@@ -85,5 +108,5 @@ fn subject(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Subject
     input::check_joints(&options.input, &table.measurements, arm.joint_count())?;
     let noise = if options.robot.position_noise_um.is_some() { NoiseSource::Declared } else { NoiseSource::Assumed };
     let sensor = session::real_sensor(&real, &table.measurements);
-    Ok(Subject { arm, sensor, noise, measurements: table.measurements, notes })
+    Ok(Subject { start, arm, sensor, noise, measurements: table.measurements, notes })
 }

@@ -279,7 +279,7 @@ impl Progress {
                 self.bar.set_position(step.evaluations);
                 self.bar.set_message(self.criterion.value(step.best));
             }
-            Event::Start(_) | Event::Identified(_) | Event::Note(_) => {}
+            Event::Start(_) | Event::Identified(_) | Event::Diagnosed(_) | Event::Note(_) => {}
         }
     }
 

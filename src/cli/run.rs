@@ -37,6 +37,15 @@ pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result
     output::show(global, &report::design(&run.design, parameter_count, scene.design.jacobian_scaling))?;
     output::show(global, &report::settling(&run.truth).text)?;
     output::show(global, &report::identification(&run.identification))?;
+    let diagnosed = match &run.diagnosis {
+        Ok(diagnosis) => report::diagnosis::answer(diagnosis),
+        // That nothing can be said of the rest does not make the calibration a bad one.
+        Err(error) => {
+            let error = error.to_string();
+            format!("Note: no diagnosis: {error}{}\n", if error.ends_with('?') { "" } else { "." })
+        }
+    };
+    output::show(global, &diagnosed)?;
     if let Some(recording) = &recording {
         output::show(
             global,
@@ -56,6 +65,8 @@ pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result
             "seed": scene.seed,
             "design": run.design,
             "identification": run.identification,
+            "diagnosis": run.diagnosis.as_ref().ok(),
+            "no_diagnosis": run.diagnosis.as_ref().err().map(ToString::to_string),
             "recording": recording,
             "truth": truth_path,
             "urdf": urdf_path,

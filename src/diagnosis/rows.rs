@@ -25,7 +25,7 @@ const IMPLAUSIBLE: f64 = 12.0;
 const STEPS: usize = 30;
 
 /// Why nothing can be diagnosed.
-#[derive(Debug, thiserror::Error, PartialEq)]
+#[derive(Clone, Debug, thiserror::Error, PartialEq)]
 pub enum DiagnosisError {
     /// Too few rows.
     #[error("{found} rows at {different} different configurations; a diagnosis needs at least {needed} different ones")]

@@ -107,6 +107,7 @@ impl Encoder {
             Event::Designed(outcome) => self.designed(outcome, &mut messages)?,
             Event::Measured(measurement) => self.measured(measurement, &mut messages)?,
             Event::Identified(identification) => self.identified(identification, &mut messages)?,
+            Event::Diagnosed(diagnosis) => messages.json(Topic::Diagnosis, diagnosis.as_ref())?,
             Event::Note(note) => messages.protobuf(
                 Topic::Log,
                 &Log {
@@ -125,7 +126,7 @@ impl Encoder {
     fn advance(&mut self, event: &Event) {
         let next = self.now_ns.saturating_add(STEP_NS);
         match event {
-            Event::Swarm(_) | Event::Search(_) | Event::Identified(_) => self.now_ns = next,
+            Event::Swarm(_) | Event::Search(_) | Event::Identified(_) | Event::Diagnosed(_) => self.now_ns = next,
             Event::Designed(_) => {
                 self.now_ns = next;
                 self.session_start_ns = None;

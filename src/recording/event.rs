@@ -1,6 +1,7 @@
 //! What happens in a run, in order. Live views, the recording and its replay all see this one type.
 
 use crate::design::outcome::{DesignOutcome, SearchStep, SwarmIteration};
+use crate::diagnosis::outcome::Diagnosis;
 use crate::identification::outcome::Identification;
 use crate::measurement::Measurement;
 
@@ -19,6 +20,8 @@ pub enum Event {
     Measured(Measurement),
     /// The parameters have been identified.
     Identified(Identification),
+    /// What causes the rest has been looked for in all readings.
+    Diagnosed(Box<Diagnosis>),
     /// Something worth telling.
     Note(String),
 }

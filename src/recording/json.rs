@@ -1,9 +1,11 @@
 //! JSON forms of the source messages: those of the events themselves but where a viewer needs another.
 
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 use super::event::Start;
 use crate::design::outcome::{Advice, DesignOutcome, EvennessDomains, RandomReference, SearchStep, StopReason, SwarmIteration};
+use crate::diagnosis::outcome::Diagnosis;
 use crate::identification::outcome::Identification;
 use crate::measurement::Measurement;
 use crate::quality::Indexes;
@@ -75,6 +77,42 @@ as_form! {
     }
     SearchStep, SearchForm {}
     DesignOutcome, DesignForm {}
+}
+
+/// As `kincal diagnose --json`, but that what is absent is not written, and confusion sets are objects: Foxglove takes neither types
+/// that may be null nor arrays of arrays.
+impl Source for Diagnosis {
+    fn to_json(&self) -> serde_json::Result<Vec<u8>> {
+        let mut value = serde_json::to_value(self)?;
+        without_null(&mut value);
+        if let Some(sets) = value.get_mut(SETS).and_then(Value::as_array_mut) {
+            sets.iter_mut().for_each(|set| *set = json!({ CANDIDATES: set.take() }));
+        }
+        serde_json::to_vec(&value)
+    }
+
+    fn from_json(data: &[u8]) -> serde_json::Result<Self> {
+        let mut value: Value = serde_json::from_slice(data)?;
+        if let Some(sets) = value.get_mut(SETS).and_then(Value::as_array_mut) {
+            sets.iter_mut().for_each(|set| *set = set.get_mut(CANDIDATES).map(Value::take).unwrap_or_default());
+        }
+        serde_json::from_value(value)
+    }
+}
+
+const SETS: &str = "confusion_sets";
+const CANDIDATES: &str = "candidates";
+
+/// Takes out the members of objects that are null.
+fn without_null(value: &mut Value) {
+    match value {
+        Value::Object(members) => {
+            members.retain(|_, member| !member.is_null());
+            members.values_mut().for_each(without_null);
+        }
+        Value::Array(items) => items.iter_mut().for_each(without_null),
+        _ => {}
+    }
 }
 
 /// Configurations as objects: Foxglove shows no arrays of arrays.

@@ -491,6 +491,7 @@ pub fn read(path: &Path) -> Result<Recording, ReadError> {
             Some(Topic::Design) => parse(&message.data).map(Event::Designed),
             Some(Topic::Measurement) => parse(&message.data).map(Event::Measured),
             Some(Topic::Identification) => parse(&message.data).map(Event::Identified),
+            Some(Topic::Diagnosis) => parse(&message.data).map(|diagnosis| Event::Diagnosed(Box::new(diagnosis))),
             Some(Topic::Log) => {
                 Log::decode(message.data.as_slice()).map(|log| Event::Note(log.message)).map_err(|error| error.to_string())
             }

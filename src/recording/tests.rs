@@ -12,6 +12,12 @@ use super::topic::Topic;
 use super::*;
 use crate::arm::{Arm, Fixture, Geometry, Link, Shape};
 use crate::design::outcome::{Advice, DesignOutcome, EvennessDomains, RandomReference, SearchStep, StopReason, SwarmIteration};
+use crate::diagnosis::held_out::Block;
+use crate::diagnosis::outcome::{
+    self, Blocked, Candidate, Diagnosis, Effect, Gap, Magnitude, Map, MinimumDetectable, NoiseFloor, NoiseSource, Parameters,
+    Place, Undetectable, Unknown, Verdict,
+};
+use crate::effects::Level;
 use crate::frames::{Pose, pose_error};
 use crate::identification::outcome::{Combination, DeclaredNoise, Errors, Identification, ParameterEstimate, Residual, Summary};
 use crate::kinematics::chain::{Joint, JointKind};
@@ -164,6 +170,7 @@ fn events(size: &Size) -> Vec<Event> {
             target: (index % 3 == 0).then(|| "smr 1".to_owned()),
         }));
     }
+    events.push(Event::Diagnosed(Box::new(diagnosis(&mut stream, size.measurements))));
     events.push(Event::Note("fitting".to_owned()));
     let summary = |stream: &mut Stream| Summary { min: 0.0, mean: stream.uniform(0.0, 1e-3), rms: 1e-3, max: 2e-3 };
     let errors = |stream: &mut Stream, rotation: bool| Errors {
@@ -215,6 +222,92 @@ fn events(size: &Size) -> Vec<Event> {
         notes: vec!["weights: declared noise".to_owned()],
     }));
     events
+}
+
+/// A diagnosis with something in every part, and with everything absent that may be.
+fn diagnosis(stream: &mut Stream, readings: usize) -> Diagnosis {
+    let place = |index, time_s| Place { level: Level::Joint, index, time_s };
+    let effect = |stream: &mut Stream, parameters| Effect {
+        kind: "backlash".to_owned(),
+        location: place(Some(3), None),
+        probability: stream.uniform(0.0, 1.0),
+        magnitude: Magnitude {
+            value: stream.uniform(0.0, 1e-3),
+            unit: "rad".to_owned(),
+            ci95: [-0.0, stream.uniform(0.0, 1e-3)],
+        },
+        parameters,
+        held_out_rms_before_m: stream.uniform(0.0, 1e-3),
+        held_out_rms_after_m: stream.uniform(0.0, 1e-3),
+        gap_closed: Some(stream.uniform(0.0, 1.0)),
+        folds: [4, 5],
+        detail: String::new(),
+    };
+    let all = Parameters {
+        sign: Some(-1.0),
+        phase_rad: Some(stream.uniform(-1.0, 1.0)),
+        order: Some(2.0),
+        source: Some(2),
+        translation_m: Some([1e-6, -0.0, 3e-6]),
+        rotation_rad: Some([0.0; 3]),
+        after: Some(0.5),
+        row: Some(7),
+        factor: Some(3.0),
+        held: Some(0.1),
+    };
+    let none = Effect { gap_closed: None, ..effect(stream, Parameters::default()) };
+    let candidate = |stream: &mut Stream, index| Candidate {
+        kind: "unknown".to_owned(),
+        location: place(index, Some(12.5)),
+        probability: stream.uniform(0.0, 1.0),
+        detail: "a bump".to_owned(),
+    };
+    let sets = [[Some(1), None], [Some(2), Some(4)]].map(|set| set.map(|index| candidate(stream, index)).to_vec());
+    let least = |value, reason: &str| Undetectable {
+        kind: "base_drift".to_owned(),
+        location: Place { level: Level::Base, index: None, time_s: None },
+        minimum_detectable: MinimumDetectable { value, unit: "m".to_owned() },
+        reason: reason.to_owned(),
+    };
+    Diagnosis {
+        verdict: Verdict::Ambiguous,
+        sentence: "Something is there.".to_owned(),
+        noise_floor: NoiseFloor { position_m: 1e-5 / 3.0, rotation_rad: None, source: NoiseSource::Declared },
+        gap: Gap {
+            nominal_rms_m: stream.uniform(0.0, 1e-3),
+            geometry_rms_m: stream.uniform(0.0, 1e-4),
+            explained_rms_m: stream.uniform(0.0, 1e-5),
+            noise_rms_m: 1e-5,
+            gap_closed: Some(0.75),
+            gap_closed_ci95: Some([0.5, 0.9]),
+            folds: 5,
+            blocked: vec![Blocked {
+                by: Block::Payload,
+                folds: 2,
+                nominal_rms_m: 1e-3,
+                geometry_rms_m: 1e-4,
+                explained_rms_m: 1e-5,
+            }],
+        },
+        effects: vec![effect(stream, all), none],
+        confusion_sets: sets.to_vec(),
+        undetectable: vec![least(None, "no payload")],
+        detectable: vec![least(Some(stream.uniform(0.0, 1e-3)), "")],
+        unknown: Unknown { present: true, p_value: 1e-300, r#where: Some("joint 2".to_owned()) },
+        maps: vec![Map { joint: 1, angle: vec![-0.5, 0.5], mean: vec![-0.0, 1e-6], standard_error: vec![1e-6; 2] }],
+        next_measurements: vec!["more".to_owned()],
+        notes: vec!["a note".to_owned()],
+        readings,
+        residuals: (0..readings)
+            .map(|row| outcome::Residual {
+                row,
+                position_m: [0, 1, 2].map(|_| stream.uniform(-1.0, 1.0)),
+                before_m: [0, 1, 2].map(|_| stream.uniform(-1e-4, 1e-4)),
+                after_m: [0, 1, 2].map(|_| stream.uniform(-1e-5, 1e-5)),
+                cause: [Some(0), Some(1), None][row % 3],
+            })
+            .collect(),
+    }
 }
 
 /// The same run with a search of `steps` steps in place of the swarm, and advice.
@@ -315,7 +408,7 @@ fn a_search_comes_back_bit_for_bit_whole_or_cut_off_and_replays() {
         }
     }
     // Start; note and steps by tens; the design; measurements by sixteens; all but the end. Chunk by chunk.
-    assert_eq!(counts.into_iter().collect::<Vec<_>>(), [1, 12, 22, 26, 42, 48]);
+    assert_eq!(counts.into_iter().collect::<Vec<_>>(), [1, 12, 22, 26, 42, 47, 49]);
 
     type Change = fn(&mut Event);
     let cases: [(usize, Change, &str); 3] = [
@@ -382,8 +475,8 @@ fn times_never_go_backwards_and_every_event_stands_in_one_chunk() {
         assert!(message.topic().is_some());
     }
     assert_eq!(messages.cut(), None);
-    // 0.1 s each: 24 iterations, the design, the lead to the session, the identification; 19 poses every 12.5 s.
-    assert_eq!(last, 100_000_000 * (24 + 1 + 1 + 1) + 19 * 12_500_000_000);
+    // 0.1 s each: 24 iterations, the design, the lead to the session, the diagnosis, the identification; 19 poses every 12.5 s.
+    assert_eq!(last, 100_000_000 * (24 + 1 + 1 + 1 + 1) + 19 * 12_500_000_000);
     assert!(bytes.len() < 400_000, "{} bytes", bytes.len());
 }
 
@@ -410,8 +503,8 @@ fn a_truncated_recording_is_readable_up_to_its_last_whole_chunk() {
             Err(error) => panic!("{length}: {error}"),
         }
     }
-    // Start; note and iterations by tens; the design; measurements by sixteens; all. Chunk by chunk.
-    assert_eq!(counts.into_iter().collect::<Vec<_>>(), [1, 12, 22, 27, 43, 49]);
+    // Start; note and iterations by tens; the design; measurements by sixteens; the diagnosis; all. Chunk by chunk.
+    assert_eq!(counts.into_iter().collect::<Vec<_>>(), [1, 12, 22, 27, 43, 48, 50]);
 }
 
 #[test]
@@ -616,6 +709,9 @@ fn what_cannot_be_read_back_is_refused() {
     let Event::Measured(measurement) = &mut events[30] else { panic!() };
     measurement.joints.pop();
     assert_eq!(refused(&events[30]), "/measurement: a configuration has 5 joint coordinates, the arm has 6 joints");
+    let Event::Diagnosed(diagnosis) = &mut events[47] else { panic!() };
+    diagnosis.gap.gap_closed = Some(f64::NAN);
+    assert!(refused(&events[47]).starts_with("/diagnosis: a number is NaN or infinite"), "{}", refused(&events[47]));
     let Some(Event::Identified(identification)) = events.last_mut() else { panic!() };
     identification.parameters[1].standard_error = Some(f64::INFINITY);
     assert!(refused(events.last().unwrap()).contains("NaN or infinite"));
@@ -647,7 +743,7 @@ fn a_change_in_the_last_bit_is_found_and_named() {
     let events = events(&SMALL);
     let path = record(directory.path(), &events);
     type Change = fn(&mut Event);
-    let cases: [(usize, Change, &str); 6] = [
+    let cases: [(usize, Change, &str); 7] = [
         (
             4,
             |event| {
@@ -695,13 +791,22 @@ fn a_change_in_the_last_bit_is_found_and_named() {
             "/measurement[",
         ),
         (
-            48,
+            49,
             |event| {
                 if let Event::Identified(identification) = event {
                     next_up(&mut identification.parameters[3].identified)
                 }
             },
             "/identification[0].parameters[3].identified: recorded",
+        ),
+        (
+            47,
+            |event| {
+                if let Event::Diagnosed(diagnosis) = event {
+                    next_up(&mut diagnosis.confusion_sets[0][1].probability)
+                }
+            },
+            "/diagnosis[0].confusion_sets[0].candidates[1].probability: recorded",
         ),
     ];
     for (number, change, expected) in cases {

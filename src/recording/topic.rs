@@ -45,6 +45,8 @@ pub enum Topic {
     ResidualsAfter,
     /// Tool poses at the joint readings (identified arm).
     PosesPredicted,
+    /// What causes the rest.
+    Diagnosis,
     /// Notes.
     Log,
 }
@@ -62,7 +64,7 @@ pub struct Schema {
 
 impl Topic {
     /// Every topic, in the order of a run.
-    pub const ALL: [Topic; 19] = [
+    pub const ALL: [Topic; 20] = [
         Topic::Run,
         Topic::Shapes,
         Topic::ArmPoints,
@@ -81,6 +83,7 @@ impl Topic {
         Topic::ResidualsBefore,
         Topic::ResidualsAfter,
         Topic::PosesPredicted,
+        Topic::Diagnosis,
         Topic::Log,
     ];
 
@@ -106,6 +109,7 @@ impl Topic {
             Topic::ResidualsBefore => "/identification/residuals_before",
             Topic::ResidualsAfter => "/identification/residuals_after",
             Topic::PosesPredicted => "/identification/poses_predicted",
+            Topic::Diagnosis => "/diagnosis",
             Topic::Log => "/log",
         }
     }
@@ -132,6 +136,7 @@ impl Topic {
             Topic::Design => "kincal.DesignOutcome",
             Topic::Measurement => "kincal.Measurement",
             Topic::Identification => "kincal.Identification",
+            Topic::Diagnosis => "kincal.Diagnosis",
             Topic::Shapes => "foxglove.SceneUpdate",
             Topic::Transforms => "foxglove.FrameTransforms",
             Topic::ArmPoints | Topic::SwarmEndPoints | Topic::BestEndPoints | Topic::ResidualsBefore | Topic::ResidualsAfter => {
@@ -172,6 +177,7 @@ impl Topic {
             Topic::Design => Some(include_str!("schemas/design_outcome.json")),
             Topic::Measurement => Some(include_str!("schemas/measurement.json")),
             Topic::Identification => Some(include_str!("schemas/identification.json")),
+            Topic::Diagnosis => Some(include_str!("schemas/diagnosis.json")),
             _ => None,
         }
     }
@@ -180,6 +186,9 @@ impl Topic {
 /// Puts shared parts in place of `"@name"`: Foxglove follows no `$ref`, and takes neither type lists nor arrays of arrays.
 fn expand(template: &str) -> String {
     template
+        // Before what stands in it.
+        .replace("\"@least\"", include_str!("schemas/least.json").trim_end())
+        .replace("\"@place\"", include_str!("schemas/place.json").trim_end())
         .replace("\"@errors\"", include_str!("schemas/errors.json").trim_end())
         .replace("\"@summary\"", include_str!("schemas/summary.json").trim_end())
         .replace("\"@prediction\"", include_str!("schemas/prediction.json").trim_end())

@@ -178,7 +178,7 @@ impl Recorder {
             Event::Measured(_) => self.measurements_since_flush += 1,
             _ => {}
         }
-        let phase_ended = matches!(event, Event::Start(_) | Event::Designed(_) | Event::Identified(_));
+        let phase_ended = matches!(event, Event::Start(_) | Event::Designed(_) | Event::Identified(_) | Event::Diagnosed(_));
         if phase_ended
             || self.steps_since_flush >= STEPS_PER_FLUSH
             || self.measurements_since_flush >= MEASUREMENTS_PER_FLUSH

@@ -8,22 +8,7 @@ use crate::effects::Level;
 /// The whole report.
 #[must_use]
 pub fn text(diagnosis: &Diagnosis) -> String {
-    let mut text = format!("{}\n\n", diagnosis.sentence);
-    text.push_str(&waterfall(diagnosis));
-    if !diagnosis.effects.is_empty() {
-        text.push('\n');
-        text.push_str(&causes(diagnosis));
-        text.push('\n');
-    }
-    for set in &diagnosis.confusion_sets {
-        text.push_str("\nThese cannot be told apart:\n");
-        text.push_str(&candidates(set));
-        text.push('\n');
-    }
-    if diagnosis.unknown.present {
-        let place = diagnosis.unknown.r#where.clone().unwrap_or_default();
-        text.push_str(&format!("\nUnknown: {place} (p = {}).\n", number(diagnosis.unknown.p_value)));
-    }
+    let mut text = answer(diagnosis);
     text.push_str("\nWhat remains along each joint's motion, over its travel (each step two standard errors):\n");
     for map in &diagnosis.maps {
         text.push_str(&format!("  joint {:<2} {}\n", map.joint, picture(map)));
@@ -43,35 +28,73 @@ pub fn text(diagnosis: &Diagnosis) -> String {
     text
 }
 
+/// The answer alone: the verdict in a sentence, the waterfall, the causes or what cannot be told apart, and what remains unknown.
+#[must_use]
+pub fn answer(diagnosis: &Diagnosis) -> String {
+    let mut text = format!("{}\n\n", diagnosis.sentence);
+    text.push_str(&waterfall(diagnosis));
+    if !diagnosis.effects.is_empty() {
+        text.push('\n');
+        text.push_str(&table(&CAUSES, causes(diagnosis)));
+        text.push('\n');
+    }
+    for set in &diagnosis.confusion_sets {
+        text.push_str("\nThese cannot be told apart:\n");
+        text.push_str(&table(&CANDIDATES, candidates(set)));
+        text.push('\n');
+    }
+    if diagnosis.unknown.present {
+        let place = diagnosis.unknown.r#where.clone().unwrap_or_default();
+        text.push_str(&format!("\nUnknown: {place} (p = {}).\n", number(diagnosis.unknown.p_value)));
+    }
+    text
+}
+
 fn um(metres: f64) -> String {
     number(metres * 1e6)
 }
 
-fn waterfall(diagnosis: &Diagnosis) -> String {
+/// A step of the waterfall.
+pub(crate) struct Step {
+    /// What is modelled so far.
+    pub(crate) name: String,
+    /// 3-D position RMS on held-out poses, m.
+    pub(crate) rms_m: f64,
+    /// Position in `effects` of the cause that this step adds.
+    #[cfg_attr(not(feature = "viewer"), expect(dead_code, reason = "text needs no colour"))]
+    pub(crate) effect: Option<usize>,
+}
+
+/// The steps from the nominal model to the noise.
+pub(crate) fn steps(diagnosis: &Diagnosis) -> Vec<Step> {
     let gap = &diagnosis.gap;
     let source = match diagnosis.noise_floor.source {
         NoiseSource::Repeats => "from repeats",
         NoiseSource::Declared => "declared",
         NoiseSource::Assumed => "assumed",
     };
+    let step = |name: &str, rms_m| Step { name: name.to_owned(), rms_m, effect: None };
+    let mut steps = vec![step("nominal (base and tool fitted)", gap.nominal_rms_m), step("geometry", gap.geometry_rms_m)];
+    for (number, effect) in diagnosis.effects.iter().enumerate() {
+        if effect.held_out_rms_after_m != effect.held_out_rms_before_m {
+            let name = format!("+ {} {}", effect.kind, place(&effect.location));
+            steps.push(Step { name, rms_m: effect.held_out_rms_after_m, effect: Some(number) });
+        }
+    }
+    steps.push(step("all that each fold chose", gap.explained_rms_m));
+    steps.push(step(&format!("noise floor ({source})"), gap.noise_rms_m));
+    steps
+}
+
+fn waterfall(diagnosis: &Diagnosis) -> String {
+    let gap = &diagnosis.gap;
     let most = gap.nominal_rms_m.max(gap.noise_rms_m).max(1e-12);
     // Lengths of bars are logarithmic: each step is half as long.
     let bar = |value: f64| {
         let length = 24.0 + 4.0 * libm::log2((value / most).max(1e-9));
         "█".repeat(length.clamp(1.0, 24.0) as usize)
     };
-    let mut rows = vec![
-        vec!["nominal (base and tool fitted)".to_owned(), um(gap.nominal_rms_m), bar(gap.nominal_rms_m)],
-        vec!["geometry".to_owned(), um(gap.geometry_rms_m), bar(gap.geometry_rms_m)],
-    ];
-    for effect in &diagnosis.effects {
-        if effect.held_out_rms_after_m != effect.held_out_rms_before_m {
-            let name = format!("+ {} {}", effect.kind, place(&effect.location));
-            rows.push(vec![name, um(effect.held_out_rms_after_m), bar(effect.held_out_rms_after_m)]);
-        }
-    }
-    rows.push(vec!["all that each fold chose".to_owned(), um(gap.explained_rms_m), bar(gap.explained_rms_m)]);
-    rows.push(vec![format!("noise floor ({source})"), um(gap.noise_rms_m), bar(gap.noise_rms_m)]);
+    let rows = steps(diagnosis).into_iter().map(|step| vec![step.name, um(step.rms_m), bar(step.rms_m)]).collect();
     let mut text = table(&[&format!("held out, {} folds", gap.folds), "RMS, µm", ""], rows);
     text.push('\n');
     for other in &gap.blocked {
@@ -97,8 +120,12 @@ fn waterfall(diagnosis: &Diagnosis) -> String {
     text
 }
 
-fn causes(diagnosis: &Diagnosis) -> String {
-    let rows = diagnosis
+/// Head of the table of causes.
+pub(crate) const CAUSES: [&str; 8] = ["cause", "where", "probability", "magnitude", "95 %", "of its gap", "folds", ""];
+
+/// Its rows, one per effect.
+pub(crate) fn causes(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
+    diagnosis
         .effects
         .iter()
         .map(|effect| {
@@ -115,8 +142,7 @@ fn causes(diagnosis: &Diagnosis) -> String {
                 effect.detail.clone(),
             ]
         })
-        .collect();
-    table(&["cause", "where", "probability", "magnitude", "95 %", "of its gap", "folds", ""], rows)
+        .collect()
 }
 
 /// A unit for people, and the factor to it.
@@ -134,7 +160,7 @@ fn shown(unit: &str) -> (&str, f64) {
 }
 
 /// A place in words.
-pub(super) fn place(place: &Place) -> String {
+pub(crate) fn place(place: &Place) -> String {
     let level = match place.level {
         Level::Joint => "joint",
         Level::Link => "link",
@@ -153,12 +179,14 @@ pub(super) fn place(place: &Place) -> String {
     }
 }
 
-fn candidates(set: &[Candidate]) -> String {
-    let rows = set
-        .iter()
+/// Head of the table of a confusion set.
+pub(crate) const CANDIDATES: [&str; 4] = ["kind", "where", "probability", ""];
+
+/// Its rows, one per hypothesis.
+pub(crate) fn candidates(set: &[Candidate]) -> Vec<Vec<String>> {
+    set.iter()
         .map(|one| vec![one.kind.clone(), place(&one.location), format!("{:.1} %", 100.0 * one.probability), one.detail.clone()])
-        .collect();
-    table(&["kind", "where", "probability", ""], rows)
+        .collect()
 }
 
 /// A map as a line: 0 to 4 steps of two standard errors above or below nothing.

@@ -17,7 +17,7 @@ use rerun::external::re_sdk_types::blueprint::archetypes::{
 use rerun::external::re_sdk_types::datatypes::{Float32, Float64, Range1D, Range2D, Uuid};
 use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
 
-use super::{by_joint, chart, picture};
+use super::{by_joint, chart, diagnosis, picture};
 use crate::report::criterion::Words;
 use crate::scene::Method;
 
@@ -39,18 +39,26 @@ pub(super) enum Choosing {
 pub(super) struct Parts {
     pub(super) choosing: Choosing,
     pub(super) measured: bool,
+    pub(super) diagnosed: bool,
+    /// Whether the diagnosis is what is opened on.
+    pub(super) diagnosis_first: bool,
 }
 
 impl Parts {
     /// What the run of a command shows; all of it for a command that is not known here.
     pub(super) fn of(command: &str, design: Option<(Method, Words)>) -> Parts {
         let choosing = match design {
-            _ if matches!(command, "measure" | "identify") => Choosing::Not,
+            _ if matches!(command, "measure" | "identify" | "diagnose") => Choosing::Not,
             None => Choosing::Not,
             Some((Method::Pso, words)) => Choosing::Swarm(words),
             Some((_, words)) => Choosing::Search(words),
         };
-        Parts { choosing, measured: command != "design" }
+        Parts {
+            choosing,
+            measured: command != "design",
+            diagnosed: !matches!(command, "design" | "measure" | "identify"),
+            diagnosis_first: command == "diagnose",
+        }
     }
 }
 
@@ -71,6 +79,8 @@ enum Node {
     },
     Container {
         kind: ContainerKind,
+        /// Shown where it is a tab; empty for none.
+        name: &'static str,
         children: Vec<(f32, Node)>,
     },
 }
@@ -80,21 +90,28 @@ fn view(class: &'static str, name: impl Into<String>, contents: &[&'static str])
 }
 
 fn rows(children: Vec<(f32, Node)>) -> Node {
-    Node::Container { kind: ContainerKind::Vertical, children }
+    Node::Container { kind: ContainerKind::Vertical, name: "", children }
 }
 
 fn columns(children: Vec<(f32, Node)>) -> Node {
-    Node::Container { kind: ContainerKind::Horizontal, children }
+    Node::Container { kind: ContainerKind::Horizontal, name: "", children }
 }
 
 fn tabs(children: Vec<Node>) -> Node {
-    Node::Container { kind: ContainerKind::Tabs, children: children.into_iter().map(|child| (1.0, child)).collect() }
+    Node::Container { kind: ContainerKind::Tabs, name: "", children: children.into_iter().map(|child| (1.0, child)).collect() }
 }
 
 impl Node {
     fn with(mut self, name: &'static str, archetype: impl AsComponents + 'static) -> Node {
         if let Node::View { properties, .. } = &mut self {
             properties.push((name, Box::new(archetype)));
+        }
+        self
+    }
+
+    fn named(mut self, title: &'static str) -> Node {
+        if let Node::Container { name, .. } = &mut self {
+            *name = title;
         }
         self
     }
@@ -115,7 +132,7 @@ impl Node {
                 }
                 Ok((path.into(), id))
             }
-            Node::Container { kind, children } => {
+            Node::Container { kind, name, children } => {
                 let mut shares = Vec::new();
                 let mut contents = Vec::new();
                 for (share, child) in children {
@@ -131,6 +148,9 @@ impl Node {
                         None => container,
                     },
                 };
+                if !name.is_empty() {
+                    container = container.with_display_name(Name(name.into()));
+                }
                 let path = format!("container/{id}");
                 let contents = contents.into_iter().map(|content| IncludedContent(content.into()));
                 stream.log(path.as_str(), &container.with_contents(contents))?;
@@ -171,7 +191,25 @@ fn drawing(name: &str, path: &'static str, [x, y]: [[f64; 2]; 2]) -> Node {
     view("2D", name, &[path]).with("VisualBounds2D", VisualBounds::new(bounds))
 }
 
-/// The tree of views.
+/// The pages: what is done, and what is diagnosed of it.
+fn pages(parts: Parts, camera: Camera, joints: usize) -> Node {
+    let run = tree(parts, camera, joints).named("Calibration");
+    if !parts.diagnosed {
+        return run;
+    }
+    let contents = ["/world/base/**", "/world/cell/**", "/world/diagnosis/**"];
+    // Nearer than where an arm stands in the picture.
+    let near = |from: f32, to: f32| to + 0.8 * (from - to);
+    let position = std::array::from_fn(|axis| near(camera.position[axis], camera.target[axis]));
+    let closer = Camera { position, ..camera };
+    let residuals = scene("Residuals by cause: geometry alone (strong), with the causes (pale)", &contents, closer);
+    let waterfall = drawing("Held-out RMS", "/diagnosis/waterfall/**", diagnosis::BOUNDS);
+    let report = view("TextDocument", "Report", &["/diagnosis/report"]);
+    let diagnosis = columns(vec![(5.0, residuals), (4.0, rows(vec![(4.0, waterfall), (5.0, report)]))]).named("Diagnosis");
+    tabs(if parts.diagnosis_first { vec![diagnosis, run] } else { vec![run, diagnosis] })
+}
+
+/// The views of what is done.
 fn tree(parts: Parts, camera: Camera, joints: usize) -> Node {
     let summary = view("TextDocument", "Summary", &["/summary"]);
     let notes = view("TextLog", "Notes", &["/notes/**"]);
@@ -261,7 +299,7 @@ pub(super) fn send(
 ) -> RecordingStreamResult<()> {
     let (blueprint, storage) = RecordingStreamBuilder::new(application).enabled(true).blueprint().memory()?;
     blueprint.set_time_sequence("blueprint", 0);
-    let (_, root) = tree(parts, camera, joints).log(&blueprint, &mut 0)?;
+    let (_, root) = pages(parts, camera, joints).log(&blueprint, &mut 0)?;
     let viewport =
         ViewportBlueprint::new().with_root_container(RootContainer(root)).with_auto_layout(false).with_auto_views(false);
     blueprint.log("viewport", &viewport)?;

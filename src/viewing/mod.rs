@@ -5,11 +5,12 @@
 //! or dies never holds up a run.
 //!
 //! Reading order: `target`, `viewer` (destination, thread), `picture` (what each event draws) with its parts `body` (arm),
-//! `chart` and `summary`, and `layout` (the blueprint).
+//! `chart`, `diagnosis` and `summary`, and `layout` (the blueprint).
 
 mod body;
 mod by_joint;
 mod chart;
+mod diagnosis;
 mod layout;
 mod picture;
 mod summary;

@@ -18,6 +18,7 @@ use sha2::{Digest, Sha256};
 use super::body::{Body, point, transform};
 use super::by_joint;
 use super::chart::{self, Series, Unit};
+use super::diagnosis::{self, Sight};
 use super::layout::{self, Camera, Choosing, Parts};
 use super::summary::{Summary, significant};
 use super::viewer::ViewerError;
@@ -133,6 +134,9 @@ impl Picture {
         for path in ["errors/position", "errors/attitude"] {
             chart::log_empty(&stream, path)?;
         }
+        if parts.diagnosed {
+            diagnosis::log_empty(&stream)?;
+        }
         Ok(stream)
     }
 
@@ -155,10 +159,14 @@ impl Picture {
         format!("{}-{hex}", self.name)
     }
 
+    fn up(&self) -> nalgebra::Vector3<f64> {
+        let up = -self.body.arm().gravity_in_base;
+        if up.norm() > 1e-9 { up.normalize() } else { nalgebra::Vector3::z() }
+    }
+
     fn camera(&self) -> Camera {
         let size = self.body.stretch;
-        let up = -self.body.arm().gravity_in_base;
-        let up = if up.norm() > 1e-9 { up.normalize() } else { nalgebra::Vector3::z() };
+        let up = self.up();
         let aside = if up.x.abs() < 0.9 { nalgebra::Vector3::x() } else { nalgebra::Vector3::y() };
         let right = (aside - up * up.dot(&aside)).normalize();
         let target = up * 0.25 * size;
@@ -177,6 +185,11 @@ impl Picture {
             Event::Designed(design) => self.designed(stream, design)?,
             Event::Measured(measurement) => self.measured(stream, measurement)?,
             Event::Identified(identified) => self.identified(stream, identified)?,
+            Event::Diagnosed(diagnosis) => {
+                let sight = Sight { stretch: self.body.stretch, up: self.up() };
+                diagnosis::log(stream, diagnosis, sight)?;
+                self.summary.diagnosed(diagnosis::summary(diagnosis));
+            }
             Event::Note(text) => return stream.log("notes", &TextLog::new(text.as_str()).with_level(TextLogLevel::INFO)),
         }
         stream.log("summary", &TextDocument::from_markdown(self.summary.markdown()))
@@ -443,8 +456,7 @@ impl Picture {
 
     /// The scales as labels above the arm.
     fn log_scales(&self, stream: &RecordingStream, scales: &[String]) -> RecordingStreamResult<()> {
-        let camera = self.camera();
-        let up = nalgebra::Vector3::from(camera.up.map(f64::from));
+        let up = self.up();
         let places = (0..scales.len()).map(|row| point(&(up * self.body.stretch * (1.12 - 0.09 * row as f64))));
         let labels = Points3D::new(places)
             .with_labels(scales.iter().map(String::as_str))
@@ -460,7 +472,7 @@ fn length(vector: &[f64]) -> f64 {
 }
 
 /// A length in the unit that reads best: `2 mm`, `20 µm`.
-fn metres(value: f64) -> String {
+pub(super) fn metres(value: f64) -> String {
     let (factor, unit) = match value {
         _ if value >= 1.0 => (1.0, "m"),
         _ if value >= 1e-3 => (1e3, "mm"),
@@ -480,7 +492,7 @@ fn role_colour(role: Role) -> [u8; 3] {
 }
 
 /// The nearest of 1, 2 and 5 times a power of ten.
-fn round(value: f64) -> f64 {
+pub(super) fn round(value: f64) -> f64 {
     let power = libm::pow(10.0, libm::floor(libm::log10(value)));
     let ratio = value / power;
     let nearest = if ratio < 1.5 {

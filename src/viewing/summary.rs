@@ -18,6 +18,7 @@ pub(super) struct Summary {
     measured: [usize; 2],
     session_s: f64,
     identified: String,
+    diagnosed: String,
 }
 
 impl Summary {
@@ -126,6 +127,10 @@ impl Summary {
         self.identified = text + "\n";
     }
 
+    pub(super) fn diagnosed(&mut self, text: String) {
+        self.diagnosed = text;
+    }
+
     /// The document.
     pub(super) fn markdown(&self) -> String {
         let [fit, held_out] = self.measured;
@@ -134,7 +139,10 @@ impl Summary {
         } else {
             format!("#### Measured\n{fit} to fit, {held_out} held out; {} min.\n\n", significant(self.session_s / 60.0, 3))
         };
-        [&self.head, &self.identified, &measured, &self.choosing, &self.design].into_iter().map(String::as_str).collect()
+        [&self.head, &self.identified, &self.diagnosed, &measured, &self.choosing, &self.design]
+            .into_iter()
+            .map(String::as_str)
+            .collect()
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::harness::{Run, kincal, names, number, quick_run};
+use crate::harness::{Run, kincal, messages, names, number, quick_run};
 
 fn check_errors(value: &Value, what: &str) {
     let kinds: &[&str] = if value["rotation_rad"].is_null() { &["position_m"] } else { &["position_m", "rotation_rad"] };
@@ -51,6 +51,23 @@ fn check_files(run: &Run, stem: &str) {
     assert_eq!(names(run.folder.path()).len(), 4);
 }
 
+/// The diagnosis of all readings, in the result and once in the recording.
+fn check_diagnosis(run: &Run, readings: usize) {
+    let diagnosis = &run.json["diagnosis"];
+    assert!(run.json["no_diagnosis"].is_null());
+    let verdicts = ["no_gap", "explained", "ambiguous", "unknown_remains", "not_detectable"];
+    assert!(verdicts.contains(&diagnosis["verdict"].as_str().unwrap()), "{diagnosis}");
+    assert_eq!((&diagnosis["readings"], diagnosis["residuals"].as_array().unwrap().len()), (&readings.into(), readings));
+    let recorded = messages(Path::new(run.json["recording"].as_str().unwrap()));
+    let recorded: Vec<_> = recorded.iter().filter(|(topic, _)| topic == "/diagnosis").collect();
+    assert_eq!(recorded.len(), 1);
+    let recorded: Value = serde_json::from_slice(&recorded[0].1).unwrap();
+    for key in ["verdict", "sentence", "maps", "notes", "next_measurements"] {
+        assert_eq!(recorded[key], diagnosis[key], "{key}");
+    }
+    assert_eq!(number(&recorded, "/gap/explained_rms_m").to_bits(), number(diagnosis, "/gap/explained_rms_m").to_bits());
+}
+
 #[test]
 fn a_run_calibrates_and_says_so() {
     let run = quick_run(&[]);
@@ -62,6 +79,7 @@ fn a_run_calibrates_and_says_so() {
     let identification = &run.json["identification"];
     check_identification(identification);
     assert_eq!((&identification["nominal"]["count"], &identification["held_out"]["count"]), (&40.into(), &50.into()));
+    check_diagnosis(&run, 90);
     // The calibrated arm is not the nominal one.
     let read = |key: &str| std::fs::read(run.json[key].as_str().unwrap()).unwrap();
     assert_ne!(read("urdf"), read("calibrated_urdf"));
@@ -95,9 +113,13 @@ fn for_people_it_is_text_on_stdout_and_quiet_is_quiet() {
     let arguments = [&["run", "scenes/arm8.toml", "--quiet"], &crate::harness::QUICK[..]].concat();
     let ran = kincal(folder.path(), &arguments).ends(0);
     assert_eq!(ran.stderr, "");
-    for expected in
-        ["Substitute for the lost Table 1", "held out (50), identified", "Identifiable: 36 of 45", "arm8.calibrated.urdf"]
-    {
+    for expected in [
+        "Substitute for the lost Table 1",
+        "held out (50), identified",
+        "Identifiable: 36 of 45",
+        "all that each fold chose",
+        "arm8.calibrated.urdf",
+    ] {
         assert!(ran.stdout.contains(expected), "{expected}: {}", ran.stdout);
     }
     assert!(!ran.stdout.contains('\u{1b}'), "escape sequences in what is no terminal");
@@ -111,6 +133,13 @@ fn a_fit_that_says_nothing_ends_with_1() {
         [&["run", "scenes/arm8.toml", "--json", "--set", "injected.parameters.angle_deg=10000"], &crate::harness::QUICK[..]];
     let json = kincal(folder.path(), &arguments.concat()).ends(1).json();
     assert!(json["identification"]["converged"] == false || json["identification"]["rank"] == 0);
+    // Nor can it be said what causes the rest: a note, with which the recording replays.
+    assert!(json["diagnosis"].is_null());
+    let reason = json["no_diagnosis"].as_str().unwrap();
+    assert!(reason.starts_with("no arm of this kind makes these readings"), "{reason}");
+    let recording = json["recording"].as_str().unwrap();
+    assert!(messages(Path::new(recording)).iter().all(|(topic, _)| topic != "/diagnosis"));
+    assert_eq!(kincal(folder.path(), &["replay", recording, "--json"]).ends(0).json()["identical"], true);
 }
 
 #[test]

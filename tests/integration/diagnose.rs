@@ -100,6 +100,17 @@ fn what_is_named_is_confirmed_by_the_physics() {
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let recording = path("gap.mcap");
     let plain = kincal(folder.path(), &["diagnose", &recording, "--json"]).ends(0).json();
+    // What the run has said of it, and shown, is the same.
+    let again = kincal(folder.path(), &[&run[..], &["--json"]].concat()).ends(0).json();
+    assert_eq!(again["diagnosis"], plain);
+    if cfg!(feature = "viewer") {
+        let shown = path("shown.rrd");
+        kincal(folder.path(), &["diagnose", &recording, "--quiet", "--rerun", &shown]).ends(0);
+        let bytes = fs::read(shown).unwrap();
+        for entity in ["/world/diagnosis/1_backlash_joint_3/before", "/diagnosis/waterfall/bars", "/diagnosis/report"] {
+            assert!(bytes.windows(entity.len()).any(|window| window == entity.as_bytes()), "{entity}");
+        }
+    }
     assert!(plain.get("confirmation").is_none());
     let ran = kincal(folder.path(), &["diagnose", &recording, "--confirm", "--json"]).ends(0);
     assert_eq!(kincal(folder.path(), &["diagnose", &recording, "--confirm", "--json", "--threads", "1"]).stdout, ran.stdout);

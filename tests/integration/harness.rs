@@ -122,6 +122,23 @@ pub(crate) fn rewrite(from: &Path, to: &Path, mut change: impl FnMut(&str, usize
     writer.finish().unwrap();
 }
 
+/// Writes the recording at `from` to `to` without the messages on `topic`; how many those were.
+pub(crate) fn without_topic(from: &Path, to: &Path, topic: &str) -> usize {
+    let bytes = fs::read(from).unwrap();
+    let mut writer = mcap::Writer::new(fs::File::create(to).unwrap()).unwrap();
+    let mut dropped = 0;
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        if message.channel.topic == topic {
+            dropped += 1;
+        } else {
+            writer.write(&message).unwrap();
+        }
+    }
+    writer.finish().unwrap();
+    dropped
+}
+
 /// Changes the text of message number `number` of the JSON topic `topic`: as text, so that nothing else in it changes.
 pub(crate) fn rewrite_text(from: &Path, to: &Path, topic: &str, number: usize, change: impl Fn(&str) -> String) {
     let mut changed = false;

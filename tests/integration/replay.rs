@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::harness::{Ran, Run, kincal, next_up, quick_run, rewrite_text};
+use crate::harness::{Ran, Run, kincal, next_up, quick_run, rewrite_text, without_topic};
 
 fn replay(run: &Run, recording: &str, more: &[&str]) -> Ran {
     let path = run.text(recording);
@@ -20,6 +20,18 @@ fn a_recording_replays_bit_for_bit_with_and_without_its_truth() {
     assert_eq!((&with["identical"], &with["truth_identical"]), (&true.into(), &true.into()));
     // Replaying leaves no files.
     assert_eq!(crate::harness::names(&run.path("replayed")), Vec::<String>::new());
+}
+
+/// As versions before the diagnosis recorded: without it, and nothing is missing.
+#[test]
+fn a_recording_without_a_diagnosis_replays() {
+    let run = quick_run(&[]);
+    let (old, new) = (run.path("old.mcap"), run.path("arm8.mcap"));
+    let dropped = without_topic(&new, &old, "/diagnosis");
+    assert_eq!(dropped, 1);
+    let json = replay(&run, "old.mcap", &["--truth", &run.text("arm8.truth.toml"), "--json"]).ends(0).json();
+    let count = crate::harness::messages(&new).len() - 1;
+    assert_eq!((&json["identical"], &json["messages_compared"]), (&true.into(), &count.into()));
 }
 
 /// Whatever chooses, the number of threads changes no byte, every step is recorded, and the recording replays.
@@ -117,6 +129,7 @@ fn a_changed_number_is_found_and_named() {
     check("/measurement", 5, "/joints/7", &["--truth", &truth], "/measurement[5].joints[7]");
     check("/design/swarm", 2, "/best/o1", &[], "/design/swarm[2].best.o1");
     check("/design/outcome", 0, "/configurations/4/joints/2", &[], "/design/outcome[0].configurations[4].joints[2]");
+    check("/diagnosis", 0, "/residuals/5/before_m/1", &[], "/diagnosis[0].residuals[5].before_m[1]");
     check("/identification", 0, "/parameters/3/identified", &[], "/identification[0].parameters[3].identified");
     // Without the truth a measurement is taken as recorded, but what was derived from it no longer fits.
     rewrite_text(&run.path("arm8.mcap"), &changed, "/measurement", 3, |text| next_up(text, "/position_m/1"));
