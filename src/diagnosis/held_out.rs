@@ -76,6 +76,8 @@ impl Problem {
 /// What one fold says.
 #[derive(Clone, Debug)]
 pub struct Fold {
+    /// What it is called ([`Scheme::names`]).
+    pub name: String,
     /// Rows.
     pub rows: usize,
     /// Sum of squares of the held-out positions, m²: base and target only.
@@ -108,6 +110,8 @@ pub struct Scheme {
     pub fold: Vec<usize>,
     /// Number of folds.
     pub folds: usize,
+    /// What each fold is called: the payload or the session; empty for regions.
+    pub names: Vec<String>,
 }
 
 /// What the rows of a fold share.
@@ -129,7 +133,8 @@ pub fn schemes(measurements: &[&Measurement], targets: &[Vector3<f64>], groups: 
     let points: Vec<Vector3<f64>> = groups.rows.iter().map(|rows| targets[rows[0]]).collect();
     let most = FOLDS.min(points.len() / 4).max(2);
     let of_group = regions(&points, most);
-    let mut schemes = vec![Scheme::new(Block::Region, groups.of.iter().map(|group| of_group[*group]).collect())];
+    let by_region = groups.of.iter().map(|group| of_group[*group]).collect();
+    let mut schemes = vec![Scheme::new(Block::Region, by_region, &[])];
     let payload: Vec<f64> = measurements.iter().map(|row| row.payload_kg.unwrap_or(0.0)).collect();
     let session: Vec<&str> = measurements.iter().map(|row| row.session.as_deref().unwrap_or_default()).collect();
     let mut payloads = payload.clone();
@@ -141,8 +146,10 @@ pub fn schemes(measurements: &[&Measurement], targets: &[Vector3<f64>], groups: 
     let number = |of: &dyn Fn(usize) -> usize| (0..measurements.len()).map(of).collect::<Vec<_>>();
     let at_payload = number(&|row| payloads.iter().position(|known| *known == payload[row]).unwrap_or(0) % FOLDS);
     let at_session = number(&|row| sessions.iter().position(|known| *known == session[row]).unwrap_or(0) % FOLDS);
-    for (by, fold) in [(Block::Payload, at_payload), (Block::Session, at_session)] {
-        let scheme = Scheme::new(by, fold);
+    let payloads: Vec<String> = payloads.iter().map(|kg| format!("{kg} kg")).collect();
+    let sessions: Vec<String> = sessions.iter().map(|name| (*name).to_owned()).collect();
+    for (by, fold, names) in [(Block::Payload, at_payload, payloads), (Block::Session, at_session, sessions)] {
+        let scheme = Scheme::new(by, fold, &names);
         // What is left must still tell where the arm stands.
         let enough =
             (0..scheme.folds).all(|out| 2 * scheme.fold.iter().filter(|fold| **fold != out).count() >= scheme.fold.len() / 2);
@@ -154,13 +161,18 @@ pub fn schemes(measurements: &[&Measurement], targets: &[Vector3<f64>], groups: 
 }
 
 impl Scheme {
-    fn new(by: Block, fold: Vec<usize>) -> Scheme {
+    /// `names`: of what each fold holds; those beyond the number of folds share one.
+    fn new(by: Block, fold: Vec<usize>, names: &[String]) -> Scheme {
         // Regions may be empty.
         let mut known = fold.clone();
         known.sort_unstable();
         known.dedup();
         let fold: Vec<usize> = fold.iter().map(|of| known.binary_search(of).unwrap_or(0)).collect();
-        Scheme { by, folds: known.len(), fold }
+        let name = |fold: &usize| {
+            let of_fold: Vec<&str> = names.iter().skip(*fold).step_by(FOLDS).map(String::as_str).collect();
+            of_fold.join(", ")
+        };
+        Scheme { by, folds: known.len(), names: known.iter().map(name).collect(), fold }
     }
 }
 
@@ -213,7 +225,8 @@ pub fn cross_validate(
         .into_par_iter()
         .filter_map(|number| {
             let rows: Vec<usize> = (0..good.len()).filter(|row| scheme.fold[*row] == number && good[*row]).collect();
-            leave_out(problem, &total.without(&grams[number]), &rows, candidates, noise, most)
+            let fold = leave_out(problem, &total.without(&grams[number]), &rows, candidates, noise, most)?;
+            Some(Fold { name: scheme.names[number].clone(), ..fold })
         })
         .collect();
     HeldOut { by: scheme.by, folds }
@@ -278,6 +291,7 @@ fn leave_out(
         explained.push(squares(&found.best.members[..count])?);
     }
     Some(Fold {
+        name: String::new(),
         rows: rows.len(),
         nominal: nominal(problem, train, rows)?,
         geometry,

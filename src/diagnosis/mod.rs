@@ -215,7 +215,8 @@ impl Singles {
         let (raw, candidates) = matrix(&rows, &conditions, hypotheses);
         let groups = groups::groups(measurements);
         let noise = noise_prior(groups::repeats(measurements, &groups), mean_sigma(sensor, measurements), options.noise);
-        let whole = held_out::Scheme { by: Block::Region, fold: vec![0; measurements.len()], folds: 1 };
+        let whole =
+            held_out::Scheme { by: Block::Region, fold: vec![0; measurements.len()], folds: 1, names: vec![String::new()] };
         Ok(Singles { problem: Problem::new(&rows, raw), whole, candidates, noise })
     }
 

@@ -117,7 +117,7 @@ pub struct Gap {
 }
 
 /// 3-D position RMS on held-out poses in another way of leaving out, m.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Blocked {
     /// What the rows of a fold share.
     pub by: Block,
@@ -128,6 +128,21 @@ pub struct Blocked {
     /// All geometry fitted.
     pub geometry_rms_m: f64,
     /// Geometry and what each fold chose.
+    pub explained_rms_m: f64,
+    /// Fold by fold.
+    pub left_out: Vec<LeftOut>,
+}
+
+/// What was left out together, and how well the rest predicts it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// The payload or the session.
+    pub name: String,
+    /// Readings.
+    pub readings: usize,
+    /// 3-D position RMS with geometry from the rest, m.
+    pub geometry_rms_m: f64,
+    /// With geometry and what the rest chose, m.
     pub explained_rms_m: f64,
 }
 

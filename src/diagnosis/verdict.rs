@@ -5,8 +5,8 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::evidence::{SCALES, fit, one_signed};
 use super::held_out::HeldOut;
 use super::outcome::{
-    Blocked, Candidate, Diagnosis, Effect, Gap, Magnitude, MinimumDetectable, NoiseFloor, NoiseSource, Parameters, Place,
-    Residual, Undetectable, Unknown, Verdict,
+    Blocked, Candidate, Diagnosis, Effect, Gap, LeftOut, Magnitude, MinimumDetectable, NoiseFloor, NoiseSource, Parameters,
+    Place, Residual, Undetectable, Unknown, Verdict,
 };
 use super::parameters::parameters;
 use super::power::Bench;
@@ -37,6 +37,19 @@ fn blocked(held_out: &HeldOut) -> Option<Blocked> {
         nominal_rms_m: rms(held_out.folds.iter().map(|fold| fold.nominal).sum()),
         geometry_rms_m: rms(held_out.folds.iter().map(|fold| fold.geometry).sum()),
         explained_rms_m: rms(held_out.folds.iter().map(|fold| *fold.explained.last().unwrap_or(&fold.geometry)).sum()),
+        left_out: held_out
+            .folds
+            .iter()
+            .map(|fold| {
+                let rms = |squares: f64| libm::sqrt(squares / fold.rows as f64);
+                LeftOut {
+                    name: fold.name.clone(),
+                    readings: fold.rows,
+                    geometry_rms_m: rms(fold.geometry),
+                    explained_rms_m: rms(*fold.explained.last().unwrap_or(&fold.geometry)),
+                }
+            })
+            .collect(),
     })
 }
 

@@ -14,8 +14,8 @@ use crate::arm::{Arm, Fixture, Geometry, Link, Shape};
 use crate::design::outcome::{Advice, DesignOutcome, EvennessDomains, RandomReference, SearchStep, StopReason, SwarmIteration};
 use crate::diagnosis::held_out::Block;
 use crate::diagnosis::outcome::{
-    self, Blocked, Candidate, Diagnosis, Effect, Gap, Magnitude, Map, MinimumDetectable, NoiseFloor, NoiseSource, Parameters,
-    Place, Undetectable, Unknown, Verdict,
+    self, Blocked, Candidate, Diagnosis, Effect, Gap, LeftOut, Magnitude, Map, MinimumDetectable, NoiseFloor, NoiseSource,
+    Parameters, Place, Undetectable, Unknown, Verdict,
 };
 use crate::effects::Level;
 use crate::frames::{Pose, pose_error};
@@ -287,6 +287,12 @@ fn diagnosis(stream: &mut Stream, readings: usize) -> Diagnosis {
                 nominal_rms_m: 1e-3,
                 geometry_rms_m: 1e-4,
                 explained_rms_m: 1e-5,
+                left_out: vec![LeftOut {
+                    name: "4 kg".to_owned(),
+                    readings: 30,
+                    geometry_rms_m: 1e-4,
+                    explained_rms_m: stream.uniform(0.0, 1e-5),
+                }],
             }],
         },
         effects: vec![effect(stream, all), none],

@@ -88,11 +88,12 @@ pub(crate) fn steps(diagnosis: &Diagnosis) -> Vec<Step> {
 
 fn waterfall(diagnosis: &Diagnosis) -> String {
     let gap = &diagnosis.gap;
-    let most = gap.nominal_rms_m.max(gap.noise_rms_m).max(1e-12);
-    // Lengths of bars are logarithmic: each step is half as long.
+    let most = gap.geometry_rms_m.max(gap.explained_rms_m).max(gap.noise_rms_m).max(1e-12);
+    // In proportion; what geometry takes is out of it.
     let bar = |value: f64| {
-        let length = 24.0 + 4.0 * libm::log2((value / most).max(1e-9));
-        "█".repeat(length.clamp(1.0, 24.0) as usize)
+        let length = (24.0 * value / most).round().clamp(1.0, 24.0);
+        let beyond = if value > 1.02 * most { "…" } else { "" };
+        format!("{}{beyond}", "█".repeat(length as usize))
     };
     let rows = steps(diagnosis).into_iter().map(|step| vec![step.name, um(step.rms_m), bar(step.rms_m)]).collect();
     let mut text = table(&[&format!("held out, {} folds", gap.folds), "RMS, µm", ""], rows);
@@ -103,11 +104,16 @@ fn waterfall(diagnosis: &Diagnosis) -> String {
             Block::Payload => "payloads",
             Block::Session => "sessions",
         };
+        let of_fold: Vec<String> = other
+            .left_out
+            .iter()
+            .map(|one| format!("{} {} → {}", one.name, um(one.geometry_rms_m), um(one.explained_rms_m)))
+            .collect();
         text.push_str(&format!(
-            "Whole {by} left out ({} folds): geometry {} µm, with what each fold chose {} µm.\n",
-            other.folds,
+            "Whole {by} left out: {} → {} µm ({}).\n",
             um(other.geometry_rms_m),
-            um(other.explained_rms_m)
+            um(other.explained_rms_m),
+            of_fold.join("; ")
         ));
     }
     if let Some(closed) = gap.gap_closed {
