@@ -38,6 +38,25 @@ pub struct Repeats {
     pub moved: bool,
 }
 
+impl Groups {
+    /// Rows of each group that carry the same.
+    #[must_use]
+    pub fn alike(&self, measurements: &[&Measurement]) -> Vec<Vec<usize>> {
+        let mut units: Vec<Vec<usize>> = Vec::new();
+        for rows in &self.rows {
+            let first = units.len();
+            for row in rows {
+                let payload = measurements[*row].payload_kg;
+                match units[first..].iter_mut().find(|unit| measurements[unit[0]].payload_kg == payload) {
+                    Some(unit) => unit.push(*row),
+                    None => units.push(vec![*row]),
+                }
+            }
+        }
+        units
+    }
+}
+
 /// Groups `measurements` by configuration.
 #[must_use]
 pub fn groups(measurements: &[&Measurement]) -> Groups {

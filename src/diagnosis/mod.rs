@@ -168,7 +168,7 @@ pub fn diagnose(
         let moved = moved_most(&problem, &surviving, &candidates, &coefficients, &found.best.members);
         let geometry_alone = problem.left(&surviving, &DVector::zeros(coefficients.len()));
         let residuals = residuals(&rows, measurements, &geometry_alone, &residual);
-        let structure = open_set::structure(&conditions, &position(true));
+        let structure = open_set::structure(&conditions, &position(true), &groups.alike(measurements));
         let maps = open_set::maps(&conditions, &position(false));
         let analysis = Analysis {
             rows: &rows,

@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 
 use super::conditions::Conditions;
 use super::outcome::Map;
+use crate::effects::signature::shape::Reading;
 use crate::seed::stream;
 
 /// Permutations of the residual.
@@ -30,9 +31,9 @@ struct Order {
     rows: Vec<usize>,
 }
 
-/// Orders of the rows by everything that was recorded.
-fn orders(conditions: &Conditions) -> Vec<Order> {
-    let readings = &conditions.readings;
+/// Orders of the readings `rows` of `conditions` by everything that was recorded; as places in `rows`.
+fn orders(conditions: &Conditions, rows: &[usize]) -> Vec<Order> {
+    let readings: Vec<&Reading> = rows.iter().map(|row| &conditions.readings[*row]).collect();
     let by = |name: String, value: &dyn Fn(usize) -> f64| {
         let mut rows: Vec<usize> = (0..readings.len()).collect();
         rows.sort_by(|a, b| value(*a).total_cmp(&value(*b)).then(a.cmp(b)));
@@ -52,17 +53,24 @@ fn orders(conditions: &Conditions) -> Vec<Order> {
     orders
 }
 
-/// Tests `residual` (one vector per row, in sigmas) for likeness of neighbours in every order.
+/// Tests `residual` (one vector per row, in sigmas times the root of the row's weight) for likeness of neighbours in every order. The
+/// rows of each of `units` count as one: readings of one configuration are alike without any structure between configurations.
 #[must_use]
-pub fn structure(conditions: &Conditions, residual: &[Vector3<f64>]) -> Structure {
+pub fn structure(conditions: &Conditions, residual: &[Vector3<f64>], units: &[Vec<usize>]) -> Structure {
+    let rows: Vec<usize> = units.iter().map(|unit| unit[0]).collect();
+    let residual: Vec<Vector3<f64>> = units
+        .iter()
+        .map(|unit| unit.iter().map(|row| residual[*row]).sum::<Vector3<f64>>() / (unit.len() as f64).sqrt())
+        .collect();
+    let residual = residual.as_slice();
     let total = residual.len();
-    let orders = orders(conditions);
+    let orders = orders(conditions, &rows);
     // Along each joint's motion, too: a joint's error is a scalar that may change sign with the pose as a vector does.
     let joints = conditions.columns.travel.len();
     let directions: Vec<Vec<Vector3<f64>>> = (0..joints)
         .map(|joint| {
             let moved = |row: usize| {
-                let [x, y, z, ..] = conditions.readings[row].moved(joint, 1.0);
+                let [x, y, z, ..] = conditions.readings[rows[row]].moved(joint, 1.0);
                 Vector3::new(x, y, z)
             };
             let all: Vec<Vector3<f64>> = (0..total).map(moved).collect();

@@ -243,3 +243,75 @@ fn what_is_said_is_as_the_schema_has_it() {
     value["effects"][0]["kind"] = "gremlins".into();
     assert!(check(&schema, &schema, &value, "").unwrap_err().contains("/effects/0/kind"));
 }
+
+#[test]
+fn several_targets_of_a_pose_do_not_make_it_surer() {
+    // Each visit has an error of its own that its three targets share: nothing that a kind of effect makes.
+    let (arm, rows) = readings("test/targets", |_, _, _, _, _| 0.0);
+    let mut shared = stream(7, "test/shared");
+    let mut sensor_noise = stream(8, "test/noise");
+    let at = arm.chain.at_nominal();
+    let offsets = [Vector3::zeros(), Vector3::new(0.1, 0.0, 0.02), Vector3::new(-0.04, 0.09, 0.0)];
+    let mut read = Vec::new();
+    for row in &rows {
+        let error = Vector3::from_fn(|_, _| 3.0 * SIGMA * shared.normal());
+        for (target, offset) in offsets.iter().enumerate() {
+            // About the nominal attitude: within what geometry absorbs.
+            let lever = at.forward(&row.joints).rotation * offset;
+            let noise = Vector3::from_fn(|_, _| SIGMA * sensor_noise.normal());
+            let position = Vector3::from(row.position_m) + lever + error + noise;
+            read.push(Measurement {
+                index: read.len(),
+                position_m: position.into(),
+                target: Some(format!("T{target}")),
+                ..row.clone()
+            });
+        }
+    }
+    let found = diagnosed(&arm, &read, Vec::new());
+    assert!(found.effects.is_empty(), "{}", found.sentence);
+    assert!(found.unknown.p_value > 0.003, "{:?}", found.unknown);
+    assert!(found.notes.iter().any(|note| note.contains("weighted down")), "{:?}", found.notes);
+}
+
+#[test]
+fn sessions_with_bases_of_their_own_are_no_step() {
+    let (arm, mut rows) = readings("test/sessions", |_, _, _, _, _| 0.0);
+    let moved = nalgebra::Isometry3::new(Vector3::new(0.4, -0.2, 0.05), Vector3::new(0.02, 0.0, 0.3));
+    for row in &mut rows {
+        let second = row.index >= 25;
+        row.session = Some(if second { "b" } else { "a" }.to_owned());
+        if second {
+            row.position_m = (moved * row.position()).coords.into();
+        }
+    }
+    let found = diagnosed(&arm, &rows, Vec::new());
+    assert!(found.effects.is_empty() && !found.unknown.present, "{}", found.sentence);
+    assert!(found.notes.iter().any(|note| note.contains("bases of their own")), "{:?}", found.notes);
+    let by_session = found.gap.blocked.iter().find(|blocked| blocked.by == super::held_out::Block::Session).unwrap();
+    assert_eq!(by_session.left_out.iter().map(|one| one.readings).collect::<Vec<_>>(), [25, 35]);
+    // Where the base stays, one is fitted.
+    let (arm, mut rows) = readings("test/sessions", |_, _, _, _, _| 0.0);
+    rows.iter_mut().for_each(|row| row.session = Some(if row.index >= 25 { "b" } else { "a" }.to_owned()));
+    let found = diagnosed(&arm, &rows, Vec::new());
+    assert!(found.notes.iter().any(|note| note.contains("share one base")), "{:?}", found.notes);
+}
+
+#[test]
+fn what_a_table_got_wrong_is_named() {
+    let (arm, rows) = readings("test/mistakes", |_, _, _, _, _| 0.0);
+    let says = |change: &dyn Fn(&mut Measurement), expected: &str| {
+        let mut rows = rows.clone();
+        rows.iter_mut().for_each(change);
+        let rows: Vec<&Measurement> = rows.iter().collect();
+        let options = Options { noise: NoiseSource::Declared, without: Vec::new(), only: None };
+        let error = diagnose(&arm, &sensor(), &rows, &options).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    };
+    says(&|row| row.joints.swap(3, 5), "the columns of joints 4 and 6 were swapped");
+    says(&|row| row.joints[4] = -row.joints[4], "joint 5 counted the other way round");
+    says(&|row| row.joints[3] = 0.3, "The readings of joint 4 never change");
+    says(&|row| row.joints.iter_mut().for_each(|joint| *joint *= 57.295_779_5), "the joint angles were degrees");
+    says(&|row| row.position_m = row.position_m.map(|value| value * 1e-3), "the positions were metres");
+    says(&|row| row.joints = vec![0.1; 8], "1 different configurations");
+}
