@@ -250,13 +250,19 @@ fn several_targets_of_a_pose_do_not_make_it_surer() {
     let (arm, rows) = readings("test/targets", |_, _, _, _, _| 0.0);
     let mut shared = stream(7, "test/shared");
     let mut sensor_noise = stream(8, "test/noise");
-    let at = arm.chain.at_nominal();
+    // The true arm of these readings, drawn as there.
+    let mut draws: Stream = stream(5, "test/targets");
+    let mut values = arm.chain.nominal();
+    for (value, parameter) in values.iter_mut().zip(&arm.chain.parameters) {
+        let half = if parameter.quantity.unit() == "m" { 1e-3 } else { 3e-3 };
+        *value += draws.uniform(-half, half);
+    }
+    let at = arm.chain.at(&values);
     let offsets = [Vector3::zeros(), Vector3::new(0.1, 0.0, 0.02), Vector3::new(-0.04, 0.09, 0.0)];
     let mut read = Vec::new();
     for row in &rows {
         let error = Vector3::from_fn(|_, _| 3.0 * SIGMA * shared.normal());
         for (target, offset) in offsets.iter().enumerate() {
-            // About the nominal attitude: within what geometry absorbs.
             let lever = at.forward(&row.joints).rotation * offset;
             let noise = Vector3::from_fn(|_, _| SIGMA * sensor_noise.normal());
             let position = Vector3::from(row.position_m) + lever + error + noise;
