@@ -150,10 +150,7 @@ pub fn schemes(measurements: &[&Measurement], targets: &[Vector3<f64>], groups: 
     let sessions: Vec<String> = sessions.iter().map(|name| (*name).to_owned()).collect();
     for (by, fold, names) in [(Block::Payload, at_payload, payloads), (Block::Session, at_session, sessions)] {
         let scheme = Scheme::new(by, fold, &names);
-        // What is left must still tell where the arm stands.
-        let enough =
-            (0..scheme.folds).all(|out| 2 * scheme.fold.iter().filter(|fold| **fold != out).count() >= scheme.fold.len() / 2);
-        if scheme.folds > 1 && enough {
+        if (0..scheme.folds).any(|out| scheme.leaves_enough(out)) && scheme.folds > 1 {
             schemes.push(scheme);
         }
     }
@@ -161,6 +158,11 @@ pub fn schemes(measurements: &[&Measurement], targets: &[Vector3<f64>], groups: 
 }
 
 impl Scheme {
+    /// Whether a quarter of the rows is left without fold `out`: less would hardly tell where the arm stands.
+    fn leaves_enough(&self, out: usize) -> bool {
+        4 * self.fold.iter().filter(|fold| **fold != out).count() >= self.fold.len()
+    }
+
     /// `names`: of what each fold holds; those beyond the number of folds share one.
     fn new(by: Block, fold: Vec<usize>, names: &[String]) -> Scheme {
         // Regions may be empty.
@@ -223,6 +225,7 @@ pub fn cross_validate(
     let total = sum(grams);
     let folds = (0..grams.len())
         .into_par_iter()
+        .filter(|number| scheme.leaves_enough(*number))
         .filter_map(|number| {
             let rows: Vec<usize> = (0..good.len()).filter(|row| scheme.fold[*row] == number && good[*row]).collect();
             let fold = leave_out(problem, &total.without(&grams[number]), &rows, candidates, noise, most)?;
