@@ -22,6 +22,8 @@ pub(crate) mod tests;
 mod verdict;
 pub mod waterfall;
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::Arm;
@@ -196,8 +198,9 @@ pub fn diagnose(
 
 /// A data set around its calibrated geometry, ready for the evidence of single effects.
 pub struct Singles {
+    /// Whitened `[geometry | signatures | residual]`.
+    whitened: DMatrix<f64>,
     problem: Problem,
-    whole: held_out::Scheme,
     candidates: Candidates,
     noise: NoisePrior,
 }
@@ -215,17 +218,45 @@ impl Singles {
         let (raw, candidates) = matrix(&rows, &conditions, hypotheses);
         let groups = groups::groups(measurements);
         let noise = noise_prior(groups::repeats(measurements, &groups), mean_sigma(sensor, measurements), options.noise);
-        let whole =
-            held_out::Scheme { by: Block::Region, fold: vec![0; measurements.len()], folds: 1, names: vec![String::new()] };
-        Ok(Singles { problem: Problem::new(&rows, raw), whole, candidates, noise })
+        Ok(Singles { whitened: rows::scaled(&raw, &rows.whitening), problem: Problem::new(&rows, raw), candidates, noise })
     }
 
-    /// The evidence of every hypothesis alone, at every scale of its prior: inner products, geometry taken out, marginal likelihoods.
+    /// The evidence of every hypothesis alone, at every scale of its prior: geometry taken out, marginal likelihoods. Signatures are
+    /// not multiplied with those of other hypotheses, which only sets of effects need.
     #[must_use]
     pub fn evidence(&self) -> Vec<evidence::Model> {
-        let gram = held_out::sum(&self.problem.grams(&self.whole));
-        let Some(surviving) = gram.surviving(&self.problem.offset) else {
+        let geometry = self.problem.geometry;
+        let last = self.whitened.ncols() - 1 - geometry;
+        let (jacobian, rest) = (self.whitened.columns(0, geometry), self.whitened.columns(geometry, last + 1));
+        let transposed = jacobian.transpose();
+        let mut mixed = &transposed * rest;
+        for column in 0..geometry {
+            mixed[(column, last)] -= self.problem.offset[column];
+        }
+        let mut normal = &transposed * jacobian;
+        for column in 0..geometry {
+            normal[(column, column)] += 1.0;
+        }
+        let Some(cholesky) = normal.cholesky() else {
             return Vec::new();
+        };
+        let absorbed = cholesky.solve(&mixed);
+        let product = |a: usize, b: usize| rest.column(a).dot(&rest.column(b)) - mixed.column(a).dot(&absorbed.column(b));
+        let mut products = DMatrix::zeros(last, last);
+        for hypothesis in 0..self.candidates.hypotheses.len() {
+            for a in self.candidates.columns(hypothesis) {
+                for b in self.candidates.columns(hypothesis) {
+                    products[(a, b)] = product(a, b);
+                }
+            }
+        }
+        let pinned: f64 = cholesky.inverse().diagonal().sum();
+        let surviving = Surviving {
+            products,
+            with_residual: DVector::from_fn(last, |column, _| product(column, last)),
+            residual: (product(last, last) + self.problem.offset.norm_squared()).max(1e-12),
+            freedom: (self.whitened.nrows() as f64 - (geometry as f64 - pinned)).max(1.0),
+            absorbed,
         };
         let mut candidates = self.candidates.clone();
         weigh(&mut candidates, &surviving);
@@ -379,32 +410,22 @@ fn weigh(candidates: &mut Candidates, surviving: &Surviving) {
     }
     let active: Vec<usize> = (0..count).filter(|number| candidates.active[*number]).collect();
     let hypotheses = &candidates.hypotheses;
-    let distinct = |keys: Vec<(Option<Kind>, u8, Option<usize>)>| {
-        let mut keys = keys;
-        keys.sort_unstable();
-        keys.dedup();
-        keys.len().max(1) as f64
-    };
-    let key = |number: usize| {
-        let (kind, shape) = class(&hypotheses[number]);
-        (kind, shape, hypotheses[number].location.index)
-    };
+    let mut classes: [BTreeSet<(Option<Kind>, u8)>; 2] = Default::default();
+    let mut places: BTreeMap<(Option<Kind>, u8), BTreeMap<Option<usize>, usize>> = BTreeMap::new();
+    for number in &active {
+        let class = class(&hypotheses[*number]);
+        classes[usize::from(class.0.is_some())].insert(class);
+        *places.entry(class).or_default().entry(hypotheses[*number].location.index).or_default() += 1;
+    }
     let mut log_odds = vec![f64::NEG_INFINITY; count];
     for number in &active {
-        let (kind, shape, _) = key(*number);
-        let classes = distinct(
-            active
-                .iter()
-                .map(|other| key(*other))
-                .filter(|other| other.0.is_some() == kind.is_some())
-                .map(|other| (other.0, other.1, None))
-                .collect(),
-        );
-        let places =
-            distinct(active.iter().map(|other| key(*other)).filter(|other| (other.0, other.1) == (kind, shape)).collect());
-        let variants = active.iter().filter(|other| key(**other) == key(*number)).count() as f64;
-        let share = if kind.is_some() { 1.0 - NAMELESS } else { NAMELESS };
-        log_odds[*number] = libm::log(ODDS * share / (classes * places * variants));
+        let class = class(&hypotheses[*number]);
+        let of_class = &places[&class];
+        let variants = of_class[&hypotheses[*number].location.index] as f64;
+        let named = class.0.is_some();
+        let share = if named { 1.0 - NAMELESS } else { NAMELESS };
+        let count = classes[usize::from(named)].len() as f64;
+        log_odds[*number] = libm::log(ODDS * share / (count * of_class.len() as f64 * variants));
     }
     candidates.log_odds = log_odds;
 }

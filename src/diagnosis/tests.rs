@@ -321,3 +321,26 @@ fn what_a_table_got_wrong_is_named() {
     says(&|row| row.position_m = row.position_m.map(|value| value * 1e-3), "the positions were metres");
     says(&|row| row.joints = vec![0.1; 8], "1 different configurations");
 }
+
+#[test]
+fn single_effects_are_weighed_as_in_the_whole() {
+    let (arm, rows) =
+        readings("test/singles", |_, _, approach, joint, _| if joint == 2 { -2e-4 * f64::from(approach[2]) } else { 0.0 });
+    let rows: Vec<&Measurement> = rows.iter().collect();
+    let options = Options { noise: NoiseSource::Declared, without: Vec::new(), only: None };
+    let singles = super::Singles::new(&arm, &sensor(), &rows, &options).unwrap();
+    let quick = singles.evidence();
+    // From all inner products.
+    let whole = Gram::new(&singles.whitened, singles.problem.geometry).surviving(&singles.problem.offset).unwrap();
+    let mut candidates = singles.candidates.clone();
+    super::weigh(&mut candidates, &whole);
+    let slow = super::evidence::extensions(&whole, &candidates, singles.noise, &[]);
+    assert_eq!(quick.len(), slow.len());
+    for (quick, slow) in quick.iter().zip(&slow) {
+        assert_eq!(quick.members, slow.members);
+        let scale = slow.log_posterior.abs().max(1.0);
+        assert!((quick.log_posterior - slow.log_posterior).abs() < 1e-6 * scale, "{quick:?} {slow:?}");
+    }
+    let best = quick.iter().max_by(|a, b| a.log_posterior.total_cmp(&b.log_posterior)).unwrap();
+    assert_eq!(candidates.hypotheses[best.members[0].0].kind, Some(Kind::Backlash));
+}
