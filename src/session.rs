@@ -212,7 +212,7 @@ const NO_DIAGNOSIS: &str = "no diagnosis: ";
 /// If the measurements do not suffice.
 pub fn diagnose(scene: &Scene, measurements: &[Measurement]) -> Result<Diagnosis, DiagnosisError> {
     let rows: Vec<&Measurement> = measurements.iter().collect();
-    let options = Options { noise: NoiseSource::Declared, without: Vec::new(), only: None };
+    let options = Options::new(NoiseSource::Declared);
     let mut diagnosis = diagnosis::diagnose(&scene.arm, &scene.sensor, &rows, &options)?;
     diagnosis.notes.extend(scene.urdf_notes.iter().cloned());
     Ok(diagnosis)

@@ -22,6 +22,7 @@ use crate::experiments::challenge::{CaseTruth, Folder, Options, TrueEffect, case
 use crate::experiments::injection::Sort;
 use crate::recording::truth_file::write_whole;
 use crate::report;
+use crate::scene::SceneFile;
 
 /// What every command writes to if nobody says where.
 const USUAL_OUT: &str = "recordings";
@@ -59,6 +60,22 @@ pub(crate) fn command(global: &Global, command: &ChallengeCommand) -> anyhow::Re
     }
 }
 
+/// The scene that cases are made of: as given, or `arm8`.
+pub(super) fn base(global: &Global, scene: Option<&Path>, set: &[String]) -> anyhow::Result<SceneFile> {
+    match scene {
+        Some(scene) => {
+            output::scene(&Global { seed: None, ..global.clone() }, &SceneOptions { scene: scene.to_owned(), set: set.to_vec() })
+        }
+        None => {
+            let mut file = arm8()?;
+            for assignment in set {
+                output::assign(&mut file, assignment)?;
+            }
+            Ok(file)
+        }
+    }
+}
+
 fn new(global: &Global, options: &NewOptions) -> anyhow::Result<Outcome> {
     let seed = global.seed.context(
         "a challenge needs a seed that nobody guesses: --seed N, such as that of `od -An -N8 -tu8 /dev/urandom`; the same seed makes \
@@ -87,19 +104,7 @@ fn new(global: &Global, options: &NewOptions) -> anyhow::Result<Outcome> {
         cases.poses,
         cases.repeats
     );
-    let base = match &options.scene {
-        Some(scene) => output::scene(
-            &Global { seed: None, ..global.clone() },
-            &SceneOptions { scene: scene.clone(), set: options.set.clone() },
-        )?,
-        None => {
-            let mut file = arm8()?;
-            for assignment in &options.set {
-                output::assign(&mut file, assignment)?;
-            }
-            file
-        }
-    };
+    let base = base(global, options.scene.as_deref(), &options.set)?;
     let path = if global.out == Path::new(USUAL_OUT) { global.out.join("challenge") } else { global.out.clone() };
     // What is wrong with the scene is said before anything is written.
     let key = case::key(seed);

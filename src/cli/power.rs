@@ -6,12 +6,11 @@ use anyhow::{Context, ensure};
 use serde_json::json;
 
 use super::Outcome;
-use super::arguments::{Global, PowerOptions, SceneOptions};
+use super::arguments::{Global, PowerOptions};
 use super::output;
 use super::reproduce::Progress;
 use crate::arm::Arm;
 use crate::effects::Kind;
-use crate::experiments::arms::arm8;
 use crate::experiments::challenge::{case, power};
 use crate::experiments::injection::Sort;
 use crate::recording::truth_file::write_whole;
@@ -32,19 +31,7 @@ pub(super) fn command(global: &Global, options: &PowerOptions) -> anyhow::Result
         levels.len() >= 2 && levels.iter().all(|level| (0.01..=100.0).contains(level)),
         "--levels: two magnitudes or more, each 0.01 to 100 times the stated one"
     );
-    let base = match &options.scene {
-        Some(scene) => output::scene(
-            &Global { seed: None, ..global.clone() },
-            &SceneOptions { scene: scene.clone(), set: options.set.clone() },
-        )?,
-        None => {
-            let mut file = arm8()?;
-            for assignment in &options.set {
-                output::assign(&mut file, assignment)?;
-            }
-            file
-        }
-    };
+    let base = super::challenge::base(global, options.scene.as_deref(), &options.set)?;
     let mut sorted = levels.clone();
     sorted.sort_by(f64::total_cmp);
     let check = power::Options {
@@ -52,18 +39,7 @@ pub(super) fn command(global: &Global, options: &PowerOptions) -> anyhow::Result
         trials: options.trials,
         sets: options.sets,
         levels: sorted,
-        plan: case::Options {
-            cases: 1,
-            kinds: Vec::new(),
-            effects: [0, 0],
-            base_rate: None,
-            noise_m: vec![options.noise * 1e-6],
-            heavy_tails: 0.0,
-            understated: 0.0,
-            poses: options.poses,
-            repeats: options.poses / 6,
-            withheld: Vec::new(),
-        },
+        plan: case::Options::quiet(options.noise * 1e-6, options.poses, options.poses / 6),
         seed: global.seed.unwrap_or(SEED),
     };
     let path = |extension: &str| global.out.join(format!("power.{extension}"));
@@ -123,6 +99,7 @@ fn what(given: &[String], arm: &Arm) -> anyhow::Result<Vec<(Kind, Option<usize>)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiments::arms::arm8;
 
     #[test]
     fn kinds_come_with_or_without_a_place() {

@@ -203,6 +203,23 @@ pub fn fit(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior, me
     })
 }
 
+/// Coefficients of all signatures, zero for those that are no members.
+#[must_use]
+pub fn coefficients(
+    surviving: &Surviving,
+    candidates: &Candidates,
+    noise: NoisePrior,
+    members: &[(usize, usize)],
+) -> DVector<f64> {
+    let mut coefficients = DVector::zeros(surviving.products.ncols());
+    if let Some(fit) = fit(surviving, candidates, noise, members) {
+        for (column, value) in fit.columns.iter().zip(fit.coefficients.iter()) {
+            coefficients[*column] = *value;
+        }
+    }
+    coefficients
+}
+
 /// All models that have one effect more than `members`.
 #[must_use]
 pub fn extensions(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior, members: &[(usize, usize)]) -> Vec<Model> {

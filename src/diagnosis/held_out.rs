@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::FOLDS;
-use super::evidence::{Candidates, NoisePrior, fit};
+use super::evidence::{Candidates, NoisePrior, coefficients};
 use super::gram::{Gram, Surviving};
 use super::groups::Groups;
 use super::rows::Rows;
@@ -261,14 +261,8 @@ fn leave_out(
     let surviving = train.surviving(&problem.offset)?;
     let found = search(&surviving, candidates, noise, most);
     let last = problem.raw.ncols() - 1;
-    let squares = |members: &[(usize, usize)]| -> Option<f64> {
-        let mut coefficients = DVector::zeros(last - problem.geometry);
-        if !members.is_empty() {
-            let fit = fit(&surviving, candidates, noise, members)?;
-            for (column, value) in fit.columns.iter().zip(fit.coefficients.iter()) {
-                coefficients[*column] = *value;
-            }
-        }
+    let squares = |members: &[(usize, usize)]| -> f64 {
+        let coefficients = coefficients(&surviving, candidates, noise, members);
         // The geometry answers to what the effects leave.
         let signatures = surviving.absorbed.columns(0, last - problem.geometry);
         let change = surviving.absorbed.column(last - problem.geometry) - signatures * &coefficients;
@@ -286,12 +280,12 @@ fn leave_out(
                 sum += left * left;
             }
         }
-        Some(sum)
+        sum
     };
-    let geometry = squares(&[])?;
+    let geometry = squares(&[]);
     let mut explained = Vec::new();
     for count in 1..=found.best.members.len() {
-        explained.push(squares(&found.best.members[..count])?);
+        explained.push(squares(&found.best.members[..count]));
     }
     Some(Fold {
         name: String::new(),

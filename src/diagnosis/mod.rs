@@ -21,6 +21,7 @@ pub mod search;
 pub(crate) mod tests;
 mod verdict;
 pub mod waterfall;
+mod weights;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -59,6 +60,24 @@ pub struct Options {
     pub without: Vec<Kind>,
     /// Nothing but these kinds at these places, for who knows what is there.
     pub only: Option<Vec<(Kind, Location)>>,
+}
+
+impl Options {
+    /// The whole library.
+    #[must_use]
+    pub fn new(noise: NoiseSource) -> Options {
+        Options { noise, without: Vec::new(), only: None }
+    }
+
+    /// What is looked for.
+    fn hypotheses(&self, rows: &Rows, conditions: &Conditions) -> Vec<Hypothesis> {
+        let wanted = |hypothesis: &Hypothesis| {
+            let is = |(kind, place): &(Kind, Location)| hypothesis.kind == Some(*kind) && hypothesis.location == *place;
+            hypothesis.kind.is_none_or(|kind| !self.without.contains(&kind))
+                && self.only.as_ref().is_none_or(|only| only.iter().any(is))
+        };
+        library(&rows.mechanism, &conditions.columns).into_iter().filter(wanted).collect()
+    }
 }
 
 /// What was found, before it is put into words.
@@ -108,14 +127,7 @@ pub fn diagnose(
         let weights: Vec<f64> = dependent.iter().zip(&far).map(|(a, b)| a * b).collect();
         let rows = rows::fit(arm, Readings { sensor, measurements, weights: &weights, displacement: &displacement })?;
         let conditions = conditions::conditions(measurements, &rows);
-        let hypotheses: Vec<Hypothesis> = library(&rows.mechanism, &conditions.columns)
-            .into_iter()
-            .filter(|hypothesis| hypothesis.kind.is_none_or(|kind| !options.without.contains(&kind)))
-            .filter(|hypothesis| {
-                let is = |(kind, place): &(Kind, Location)| hypothesis.kind == Some(*kind) && hypothesis.location == *place;
-                options.only.as_ref().is_none_or(|only| only.iter().any(is))
-            })
-            .collect();
+        let hypotheses = options.hypotheses(&rows, &conditions);
         let (mut raw, mut candidates) = matrix(&rows, &conditions, hypotheses);
         put_back(&mut raw, &rows, &displacement);
         let problem = Problem::new(&rows, raw);
@@ -129,27 +141,19 @@ pub fn diagnose(
         surviving.freedom = (surviving.freedom - lost).max(1.0);
         weigh(&mut candidates, &surviving);
         let found = search::search(&surviving, &candidates, noise, search::MOST);
-        let coefficients = coefficients(&surviving, &candidates, noise, &found.best.members);
+        let coefficients = evidence::coefficients(&surviving, &candidates, noise, &found.best.members);
         let residual = problem.left(&surviving, &coefficients);
-        // In declared sigmas, whatever a row's weight.
-        let sigmas: Vec<f64> = (0..residual.len())
-            .map(|equation| residual[equation] * problem.whitening[equation] / libm::sqrt(weights[equation / rows.per_row]))
-            .collect();
-        let squares: Vec<f64> =
-            sigmas.chunks(rows.per_row).map(|row| row.iter().map(|value| value * value).sum::<f64>()).collect();
-        let next_far = outliers::weights(&squares, rows.per_row);
-        let good: Vec<bool> = next_far.iter().map(|weight| *weight > 0.5).collect();
-        let (next_dependent, correlation) = groups::weights(&groups, &sigmas, rows.per_row, &good);
+        let weighed = weights::weigh(&rows, &residual, &weights, &groups);
         let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-2);
         let mut members: Vec<(usize, usize)> = found.best.members.clone();
         members.sort_unstable();
-        let settled = same(&next_far, &far) && same(&next_dependent, &dependent) && members == before;
+        let settled = same(&weighed.far, &far) && same(&weighed.dependent, &dependent) && members == before;
         if pass + 1 < PASSES && !settled {
             displacement = displaced(&problem, &rows, &coefficients);
-            (far, dependent, before) = (next_far, next_dependent, members);
+            (far, dependent, before) = (weighed.far, weighed.dependent, members);
             continue;
         }
-        let outliers = outliers::look(&squares, rows.per_row);
+        let outliers = outliers::look(&weighed.squares, rows.per_row);
         let good: Vec<bool> = (0..total).map(|row| !outliers.rows.contains(&row)).collect();
         let held_out: Vec<held_out::HeldOut> = schemes
             .iter()
@@ -188,7 +192,7 @@ pub fn diagnose(
             measurements,
             sensor,
             repeats,
-            correlation: (groups.rows.len() < total).then_some(correlation),
+            correlation: (groups.rows.len() < total).then_some(weighed.correlation),
             options,
         };
         return Ok(verdict::put(&analysis));
@@ -214,7 +218,7 @@ impl Singles {
         let weights = vec![1.0; measurements.len()];
         let rows = rows::fit(arm, Readings { sensor, measurements, weights: &weights, displacement: &[] })?;
         let conditions = conditions::conditions(measurements, &rows);
-        let hypotheses = library(&rows.mechanism, &conditions.columns);
+        let hypotheses = options.hypotheses(&rows, &conditions);
         let (raw, candidates) = matrix(&rows, &conditions, hypotheses);
         let groups = groups::groups(measurements);
         let noise = noise_prior(groups::repeats(measurements, &groups), mean_sigma(sensor, measurements), options.noise);
@@ -275,17 +279,6 @@ fn noise_prior(repeats: Option<Repeats>, declared_m: f64, source: NoiseSource) -
         (None, NoiseSource::Assumed) => NoisePrior { freedom: 1.0, level: 1.0 },
         (None, _) => NoisePrior { freedom: 10.0, level: 1.0 },
     }
-}
-
-/// Coefficients of all signatures, zero for those that are no members.
-fn coefficients(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior, members: &[(usize, usize)]) -> DVector<f64> {
-    let mut coefficients = DVector::zeros(surviving.products.ncols());
-    if let Some(fit) = evidence::fit(surviving, candidates, noise, members) {
-        for (column, value) in fit.columns.iter().zip(fit.coefficients.iter()) {
-            coefficients[*column] = *value;
-        }
-    }
-    coefficients
 }
 
 /// What the effects do to each row, in root.

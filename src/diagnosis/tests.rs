@@ -155,7 +155,7 @@ fn a_fault_that_has_no_name_is_unknown() {
 #[test]
 fn too_few_readings_are_refused_and_swapped_joints_are_said() {
     let (arm, mut rows) = readings("test/bad", |_, _, _, _, _| 0.0);
-    let options = Options { noise: NoiseSource::Declared, without: Vec::new(), only: None };
+    let options = Options::new(NoiseSource::Declared);
     let few: Vec<&Measurement> = rows[..5].iter().collect();
     assert!(diagnose(&arm, &sensor(), &few, &options).unwrap_err().to_string().contains("at least 6"));
     let same = rows[0].clone();
@@ -310,7 +310,7 @@ fn what_a_table_got_wrong_is_named() {
         let mut rows = rows.clone();
         rows.iter_mut().for_each(change);
         let rows: Vec<&Measurement> = rows.iter().collect();
-        let options = Options { noise: NoiseSource::Declared, without: Vec::new(), only: None };
+        let options = Options::new(NoiseSource::Declared);
         let error = diagnose(&arm, &sensor(), &rows, &options).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");
     };
@@ -327,7 +327,7 @@ fn single_effects_are_weighed_as_in_the_whole() {
     let (arm, rows) =
         readings("test/singles", |_, _, approach, joint, _| if joint == 2 { -2e-4 * f64::from(approach[2]) } else { 0.0 });
     let rows: Vec<&Measurement> = rows.iter().collect();
-    let options = Options { noise: NoiseSource::Declared, without: Vec::new(), only: None };
+    let options = Options::new(NoiseSource::Declared);
     let singles = super::Singles::new(&arm, &sensor(), &rows, &options).unwrap();
     let quick = singles.evidence();
     // From all inner products.

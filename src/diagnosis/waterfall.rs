@@ -2,11 +2,12 @@
 //! ([`Waterfall::displacements`]), or told by somebody else, such as a simulation.
 
 use super::conditions::{self, Conditions};
-use super::groups::{self, groups};
+use super::groups::groups;
 use super::held_out::{self, Scheme};
 use super::outcome::Effect;
 use super::outliers;
 use super::rows::{self, DiagnosisError, Readings, Rows};
+use super::weights;
 use crate::arm::Arm;
 use crate::effects::Kind;
 use crate::effects::signature::shape::{Displacement, Shape};
@@ -55,18 +56,10 @@ impl<'a> Waterfall<'a> {
             let displacement = waterfall.all(effects);
             let weights = &waterfall.weights;
             let rows = rows::fit(arm, Readings { sensor, measurements, weights, displacement: &displacement })?;
-            // In declared sigmas, whatever a row's weight.
-            let sigmas: Vec<f64> = (0..rows.residual.len())
-                .map(|equation| rows.residual[equation] * rows.whitening[equation] / libm::sqrt(weights[equation / rows.per_row]))
-                .collect();
-            let squares: Vec<f64> =
-                sigmas.chunks(rows.per_row).map(|row| row.iter().map(|value| value * value).sum::<f64>()).collect();
-            let far = outliers::weights(&squares, rows.per_row);
-            let near: Vec<bool> = far.iter().map(|weight| *weight > 0.5).collect();
-            let (dependent, _) = groups::weights(&groups, &sigmas, rows.per_row, &near);
-            let outliers = outliers::look(&squares, rows.per_row).rows;
+            let weighed = weights::weigh(&rows, &rows.residual, weights, &groups);
+            let outliers = outliers::look(&weighed.squares, rows.per_row).rows;
             waterfall.good = (0..total).map(|row| !outliers.contains(&row)).collect();
-            waterfall.weights = far.iter().zip(&dependent).map(|(a, b)| a * b).collect();
+            waterfall.weights = weighed.far.iter().zip(&weighed.dependent).map(|(a, b)| a * b).collect();
             waterfall.conditions = conditions::conditions(measurements, &rows);
             waterfall.rows = rows;
         }

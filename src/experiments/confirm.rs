@@ -54,7 +54,7 @@ pub struct Confirmation {
     pub settling_error_m: f64,
     /// Readings that did not settle.
     pub unsettled: usize,
-    /// Readings in which some play is held by friction, which the formulas do not know.
+    /// Readings in which some play is held by friction; the formulas know that only as far as the diagnosis has found it.
     pub undecided: usize,
 }
 
@@ -536,7 +536,7 @@ mod tests {
     }
 
     fn diagnosed(scene: &Scene, rows: &[&Measurement]) -> Diagnosis {
-        let options = Options { noise: NoiseSource::Declared, without: Vec::new(), only: None };
+        let options = Options::new(NoiseSource::Declared);
         diagnose(&scene.arm, &scene.sensor, rows, &options).unwrap()
     }
 

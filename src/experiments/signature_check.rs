@@ -29,18 +29,7 @@ fn allowed(kind: Kind) -> f64 {
 
 #[test]
 fn every_signature_is_what_physics_makes() {
-    let options = Options {
-        cases: 1,
-        kinds: vec!["backlash".to_owned()],
-        effects: [1, 1],
-        base_rate: None,
-        noise_m: vec![20e-6],
-        heavy_tails: 0.0,
-        understated: 0.0,
-        poses: 60,
-        repeats: 0,
-        withheld: Vec::new(),
-    };
+    let options = Options::quiet(20e-6, 60, 0);
     let public = case::public(&arm8().unwrap(), &options, &case::key(5), 0).unwrap();
     let scene = &public.file.scene;
     let hidden = case::hidden(&public, &options, &case::key(5), 0).injected;

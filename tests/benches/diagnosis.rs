@@ -14,18 +14,8 @@ fn main() {
 
 /// A blind case with one effect (a backlash) on an arm of eight joints, read with 20 µm of noise.
 fn readings(poses: usize) -> (Scene, Vec<Measurement>) {
-    let options = challenge::Options {
-        cases: 1,
-        kinds: vec!["backlash".to_owned()],
-        effects: [1, 1],
-        base_rate: None,
-        noise_m: vec![20e-6],
-        heavy_tails: 0.0,
-        understated: 0.0,
-        poses,
-        repeats: poses / 6,
-        withheld: Vec::new(),
-    };
+    let quiet = challenge::Options::quiet(20e-6, poses, poses / 6);
+    let options = challenge::Options { kinds: vec!["backlash".to_owned()], effects: [1, 1], ..quiet };
     let key = case::key(1);
     let public = case::public(&arm8().expect("a scene"), &options, &key, 0).expect("a case");
     let hidden = case::hidden(&public, &options, &key, 0);
@@ -34,7 +24,7 @@ fn readings(poses: usize) -> (Scene, Vec<Measurement>) {
 }
 
 fn options() -> Options {
-    Options { noise: NoiseSource::Declared, without: Vec::new(), only: None }
+    Options::new(NoiseSource::Declared)
 }
 
 /// The whole diagnosis. Marks: 1 s for 60 readings, 10 s for 600, on two cores.

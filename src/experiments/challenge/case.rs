@@ -57,6 +57,25 @@ pub struct Options {
     pub withheld: Vec<String>,
 }
 
+impl Options {
+    /// One case without an effect, with noise as declared (m), of so many readings, of which so many repeat another.
+    #[must_use]
+    pub fn quiet(noise_m: f64, poses: usize, repeats: usize) -> Options {
+        Options {
+            cases: 1,
+            kinds: Vec::new(),
+            effects: [0, 0],
+            base_rate: None,
+            noise_m: vec![noise_m],
+            heavy_tails: 0.0,
+            understated: 0.0,
+            poses,
+            repeats,
+            withheld: Vec::new(),
+        }
+    }
+}
+
 /// Heavy tails of the noise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Tails {

@@ -199,7 +199,7 @@ fn cell(public: &Public, effects: Vec<Effect>, key: &str) -> Result<Diagnosis, C
     let (scene, planned) = (&public.file.scene, &public.planned);
     let (measurements, _) = measure(scene, &injected, planned, planned.len(), &mut Nobody).map_err(SessionError::from)?;
     let rows: Vec<_> = measurements.iter().collect();
-    let options = DiagnosisOptions { noise: NoiseSource::Declared, without: Vec::new(), only: None };
+    let options = DiagnosisOptions::new(NoiseSource::Declared);
     diagnose(&scene.arm, &scene.sensor, &rows, &options).map_err(|error| ChallengeError::Diagnosis { reason: error.to_string() })
 }
 
