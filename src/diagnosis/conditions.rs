@@ -143,6 +143,9 @@ pub fn conditions(measurements: &[&Measurement], rows: &Rows) -> Conditions {
             values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
         })
         .collect();
+    let unknown =
+        |reading: &Reading, joint: usize| reading.posture.torque(joint).abs() < 3.0 * reading.posture.moment_sigma(joint);
+    let upright = (0..count).map(|joint| readings.iter().all(|reading| unknown(reading, joint))).collect();
     let margin = (total / 10).max(3);
     let span = total.saturating_sub(2 * margin);
     let stride = span.div_ceil(CHANGES).max(1);
@@ -154,6 +157,7 @@ pub fn conditions(measurements: &[&Measurement], rows: &Rows) -> Conditions {
         time,
         rows: total,
         travel,
+        upright,
         changes: if time { changes } else { Vec::new() },
     };
     Conditions { readings, columns, notes, times }

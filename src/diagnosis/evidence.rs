@@ -6,6 +6,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use super::gram::Surviving;
 use crate::effects::Kind;
 use crate::effects::signature::library::Hypothesis;
+use crate::effects::signature::shape::Shape;
 
 /// Prior standard deviations of a magnitude, in units of its usual one, and how likely each is.
 pub const SCALES: [(f64, f64); 3] = [(1.0, 0.45), (2.5, 0.45), (12.0, 0.10)];
@@ -76,6 +77,19 @@ impl Candidates {
             (Some(x), Some(y)) => x == y && a.location == b.location && !matches!(x, Kind::StrainWaveError | Kind::GearCoupling),
             // Two bumps that overlap are one.
             (None, None) if a.location == b.location && overlap(a, b) => true,
+            // What bends or seats a link unequally has the equal case in it.
+            (Some(Kind::LinkBending), None) | (None, Some(Kind::LinkBending)) => {
+                a.location.index == b.location.index
+                    && [a.shape, b.shape].iter().any(|shape| matches!(shape, Shape::UnequalBend(_)))
+            }
+            (Some(Kind::TiltClearance), None) | (None, Some(Kind::TiltClearance)) => {
+                a.location.index == b.location.index
+                    && [a.shape, b.shape].iter().any(|shape| matches!(shape, Shape::UnequalSeat(_)))
+            }
+            (Some(Kind::RadialClearance), None) | (None, Some(Kind::RadialClearance)) => {
+                a.location.index == b.location.index
+                    && [a.shape, b.shape].iter().any(|shape| matches!(shape, Shape::UnequalShift(_)))
+            }
             // A cubic spring has the linear one in it.
             (Some(Kind::JointCompliance), None) | (None, Some(Kind::JointCompliance)) | (None, None) => {
                 a.location == b.location
@@ -88,7 +102,6 @@ impl Candidates {
 }
 
 fn overlap(a: &Hypothesis, b: &Hypothesis) -> bool {
-    use crate::effects::signature::shape::Shape;
     match (a.shape, b.shape) {
         (Shape::Bump { centre: x, half_width: w, .. }, Shape::Bump { centre: y, half_width: v, .. }) => (x - y).abs() < w.max(v),
         _ => false,
@@ -96,7 +109,6 @@ fn overlap(a: &Hypothesis, b: &Hypothesis) -> bool {
 }
 
 fn is_hardening(hypothesis: &Hypothesis) -> bool {
-    use crate::effects::signature::shape::Shape;
     matches!(hypothesis.shape, Shape::Hardening(_) | Shape::Softening(_))
 }
 
@@ -188,6 +200,12 @@ pub fn log_posterior(surviving: &Surviving, candidates: &Candidates, noise: Nois
 
 fn level(surviving: &Surviving, noise: NoisePrior, drop: f64) -> f64 {
     (noise.freedom * noise.level + surviving.residual - drop).max(1e-12) / (noise.freedom + surviving.freedom)
+}
+
+/// Posterior mean of the noise's mean square beside `members`, in declared sigmas.
+#[must_use]
+pub fn noise_level(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior, members: &[(usize, usize)]) -> f64 {
+    fit(surviving, candidates, noise, members).map_or_else(|| level(surviving, noise, 0.0), |fit| fit.noise)
 }
 
 /// The coefficients of `members`.

@@ -15,6 +15,7 @@ pub mod outcome;
 pub mod outliers;
 mod parameters;
 pub mod power;
+mod ripple;
 pub mod rows;
 pub mod search;
 #[cfg(test)]
@@ -28,7 +29,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::Arm;
-use crate::effects::signature::library::{Hypothesis, library};
+use crate::effects::signature::library::{Hypothesis, RIPPLES, library, ripple};
 use crate::effects::signature::shape::{Displacement, Shape};
 use crate::effects::{Kind, Location};
 use crate::measurement::{Measurement, Sensor};
@@ -38,6 +39,7 @@ use gram::Surviving;
 use groups::Repeats;
 use held_out::{Block, Problem};
 use outcome::{Diagnosis, NoiseSource};
+use ripple::Ripple;
 use rows::{DiagnosisError, Readings, Rows};
 
 /// Folds of the cross-validation.
@@ -70,13 +72,15 @@ impl Options {
     }
 
     /// What is looked for.
-    fn hypotheses(&self, rows: &Rows, conditions: &Conditions) -> Vec<Hypothesis> {
+    fn hypotheses(&self, rows: &Rows, conditions: &Conditions, ripples: &[Ripple]) -> Vec<Hypothesis> {
         let wanted = |hypothesis: &Hypothesis| {
             let is = |(kind, place): &(Kind, Location)| hypothesis.kind == Some(*kind) && hypothesis.location == *place;
             hypothesis.kind.is_none_or(|kind| !self.without.contains(&kind))
                 && self.only.as_ref().is_none_or(|only| only.iter().any(is))
         };
-        library(&rows.mechanism, &conditions.columns).into_iter().filter(wanted).collect()
+        let nameless = self.without.contains(&Kind::StrainWaveError);
+        let scanned = ripples.iter().map(|found| ripple(found.joint, found.waves, nameless));
+        library(&rows.mechanism, &conditions.columns).into_iter().chain(scanned).filter(wanted).collect()
     }
 }
 
@@ -121,13 +125,14 @@ pub fn diagnose(
     let mut far = vec![1.0; total];
     let mut displacement: Vec<Displacement> = Vec::new();
     let mut before = Vec::new();
+    let mut ripples: Vec<Ripple> = Vec::new();
     // Around the arm as it is with the effects found so far, until nothing changes: signatures are those of the fitted arm, readings
     // that are far off from the best model or that repeat others are weighted down, and geometry and effects are fitted together.
     for pass in 0..PASSES {
         let weights: Vec<f64> = dependent.iter().zip(&far).map(|(a, b)| a * b).collect();
         let rows = rows::fit(arm, Readings { sensor, measurements, weights: &weights, displacement: &displacement })?;
         let conditions = conditions::conditions(measurements, &rows);
-        let hypotheses = options.hypotheses(&rows, &conditions);
+        let hypotheses = options.hypotheses(&rows, &conditions, &ripples);
         let (mut raw, mut candidates) = matrix(&rows, &conditions, hypotheses);
         put_back(&mut raw, &rows, &displacement);
         let problem = Problem::new(&rows, raw);
@@ -148,7 +153,14 @@ pub fn diagnose(
         let mut members: Vec<(usize, usize)> = found.best.members.clone();
         members.sort_unstable();
         let settled = same(&weighed.far, &far) && same(&weighed.dependent, &dependent) && members == before;
-        if pass + 1 < PASSES && !settled {
+        let more = if pass + 1 < PASSES {
+            let level = evidence::noise_level(&surviving, &candidates, noise, &found.best.members);
+            ripple::scan(&problem, &conditions.readings, &residual, level, &candidates)
+        } else {
+            Vec::new()
+        };
+        if pass + 1 < PASSES && (!settled || !more.is_empty()) {
+            ripples.extend(more);
             displacement = displaced(&problem, &rows, &coefficients);
             (far, dependent, before) = (weighed.far, weighed.dependent, members);
             continue;
@@ -218,7 +230,7 @@ impl Singles {
         let weights = vec![1.0; measurements.len()];
         let rows = rows::fit(arm, Readings { sensor, measurements, weights: &weights, displacement: &[] })?;
         let conditions = conditions::conditions(measurements, &rows);
-        let hypotheses = options.hypotheses(&rows, &conditions);
+        let hypotheses = options.hypotheses(&rows, &conditions, &[]);
         let (raw, candidates) = matrix(&rows, &conditions, hypotheses);
         let groups = groups::groups(measurements);
         let noise = noise_prior(groups::repeats(measurements, &groups), mean_sigma(sensor, measurements), options.noise);
@@ -377,6 +389,7 @@ fn matrix(rows: &Rows, conditions: &Conditions, hypotheses: Vec<Hypothesis>) -> 
 fn class(hypothesis: &Hypothesis) -> (Option<Kind>, u8) {
     let shape = match hypothesis.shape {
         _ if hypothesis.kind.is_some() => 0,
+        Shape::Harmonic(_, order) if order >= f64::from(*RIPPLES.start()) => 17,
         Shape::Harmonic(..) => 1,
         Shape::Bump { .. } => 2,
         Shape::Crosstalk { .. } => 3,
@@ -387,6 +400,12 @@ fn class(hypothesis: &Hypothesis) -> (Option<Kind>, u8) {
         Shape::AllYield => 8,
         Shape::AngleCurve(_) => 10,
         Shape::AngleMap { .. } => 11,
+        Shape::UnequalBend(_) => 12,
+        Shape::UnequalSeat(_) => 13,
+        Shape::RootAcross(_) => 14,
+        Shape::UnequalShift(_) => 15,
+        Shape::BaseCourse(_) => 16,
+        Shape::ToolCourse(_) => 18,
         _ => 9,
     };
     (hypothesis.kind, shape)
@@ -405,6 +424,7 @@ fn weigh(candidates: &mut Candidates, surviving: &Surviving) {
     let hypotheses = &candidates.hypotheses;
     let mut classes: [BTreeSet<(Option<Kind>, u8)>; 2] = Default::default();
     let mut places: BTreeMap<(Option<Kind>, u8), BTreeMap<Option<usize>, usize>> = BTreeMap::new();
+    let joints = hypotheses.iter().filter_map(|hypothesis| hypothesis.location.index).max().unwrap_or(1);
     for number in &active {
         let class = class(&hypotheses[*number]);
         classes[usize::from(class.0.is_some())].insert(class);
@@ -418,7 +438,10 @@ fn weigh(candidates: &mut Candidates, surviving: &Surviving) {
         let named = class.0.is_some();
         let share = if named { 1.0 - NAMELESS } else { NAMELESS };
         let count = classes[usize::from(named)].len() as f64;
-        log_odds[*number] = libm::log(ODDS * share / (count * of_class.len() as f64 * variants));
+        let own = hypotheses[*number].share.unwrap_or(1.0 / variants);
+        // A scan went over all joints, whatever it found.
+        let of_class = if hypotheses[*number].share.is_some() && !named { joints } else { of_class.len() };
+        log_odds[*number] = libm::log(ODDS * share * own / (count * of_class as f64));
     }
     candidates.log_odds = log_odds;
 }

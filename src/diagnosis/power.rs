@@ -523,6 +523,7 @@ mod tests {
 
     fn hypothesis(kind: Option<Kind>, joint: usize, width: usize) -> Hypothesis {
         Hypothesis {
+            share: None,
             kind,
             location: Location { level: crate::effects::Level::Joint, index: Some(joint) },
             shape: Shape::Torque(joint),

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::evidence::{Candidates, Model, NoisePrior, extensions, log_posterior};
 use super::gram::Surviving;
+use crate::effects::{Kind, Location};
 
 /// Most effects of a set.
 pub const MOST: usize = 6;
@@ -15,7 +16,7 @@ const NEGLIGIBLE: f64 = 14.0;
 /// What a search found.
 #[derive(Clone, Debug)]
 pub struct Found {
-    /// The best set, its members in the order in which they help most.
+    /// The best variant of the most likely set of kinds at places, its members in the order in which they help most.
     pub best: Model,
     /// Models with their posterior probabilities among all explored, most likely first.
     pub models: Vec<(Vec<(usize, usize)>, f64)>,
@@ -125,16 +126,29 @@ pub fn search(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior,
             break;
         }
     }
-    let best = explored.best().cloned().unwrap_or(Model { members: Vec::new(), log_posterior: 0.0 });
+    let top = explored.best().map_or(0.0, |best| best.log_posterior);
     let mut models = Vec::new();
     let mut total = 0.0;
+    // What is claimed, whatever the variant: a step has as many as there are moments.
+    let mut claims: BTreeMap<Vec<(Option<Kind>, Location)>, (f64, &Model)> = BTreeMap::new();
     for of_set in explored.sets.values() {
-        let weight: f64 = of_set.values().map(|model| libm::exp(model.log_posterior - best.log_posterior)).sum();
-        if let Some(top) = of_set.values().max_by(|a, b| a.log_posterior.total_cmp(&b.log_posterior)) {
-            models.push((top.members.clone(), weight));
-        }
+        let weight: f64 = of_set.values().map(|model| libm::exp(model.log_posterior - top)).sum();
+        let Some(best) = of_set.values().max_by(|a, b| a.log_posterior.total_cmp(&b.log_posterior)) else {
+            continue;
+        };
+        models.push((best.members.clone(), weight));
         total += weight;
+        let claim = |(member, _): &(usize, usize)| (candidates.hypotheses[*member].kind, candidates.hypotheses[*member].location);
+        let mut claimed: Vec<_> = best.members.iter().map(claim).collect();
+        claimed.sort_unstable();
+        let known = claims.entry(claimed).or_insert((0.0, best));
+        known.0 += weight;
+        if best.log_posterior > known.1.log_posterior {
+            known.1 = best;
+        }
     }
+    let best = claims.values().max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, model)| (*model).clone());
+    let best = best.unwrap_or(Model { members: Vec::new(), log_posterior: 0.0 });
     for (_, weight) in &mut models {
         *weight /= total;
     }

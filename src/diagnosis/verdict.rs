@@ -459,7 +459,7 @@ fn confusion(analysis: &Analysis<'_>) -> Vec<Vec<Candidate>> {
         }
     }
     sets.into_iter()
-        .filter(|set| set.len() > 1 && set.iter().map(|(_, probability, _)| probability).sum::<f64>() >= 0.2)
+        .filter(|set| set.len() > 1 && set.iter().map(|(_, probability, _)| probability).sum::<f64>() >= NAMED)
         .map(|set| {
             set.into_iter()
                 .take(12)

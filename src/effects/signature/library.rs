@@ -1,13 +1,19 @@
 //! What is looked for: every kind at every place, and shapes that have no name.
 
 use super::posture::Mechanism;
-use super::shape::{FORGETTING_S, MAP_ORDERS, MEMORIES, Shape};
-use crate::effects::{Kind, Location};
+use super::shape::{Course, FORGETTING_S, MAP_ORDERS, MEMORIES, Shape};
+use crate::effects::{Kind, Level, Location};
 
 /// One second of arc, rad.
 const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
-/// Teeth counts (2 N) behind strain-wave errors that are common.
-pub const WAVES_PER_TURN: [f64; 3] = [160.0, 200.0, 240.0];
+/// Periods per turn (2 N) of the ratios N in which strain-wave gears are sold: 30, 50, 80, 100, 120, 160.
+pub const WAVES_PER_TURN: [u16; 6] = [60, 100, 160, 200, 240, 320];
+/// Periods per turn of which a ripple is looked for.
+pub const RIPPLES: std::ops::RangeInclusive<u16> = 5..=400;
+/// Of the prior of strain-wave errors, the share of ratios that are not sold off the shelf.
+const OTHER_RATIOS: f64 = 0.3;
+/// Azimuths in which gravity may lean.
+const LEANS: usize = 16;
 
 /// Shares of the load that the friction of a fit may hold in the middle of its play.
 pub const HELD: [f64; 4] = [0.0, 0.02, 0.05, 0.1];
@@ -27,6 +33,9 @@ pub struct Hypothesis {
     pub spread: Vec<f64>,
     /// In words: harmonic order, source joint, shape without a name; empty where the kind says all.
     pub detail: String,
+    /// Of the prior of its kind at its place, the share that is its own; `None`: those that say nothing share alike what is left. A
+    /// ripple found by a scan has that of one of all that were scanned.
+    pub share: Option<f64>,
 }
 
 /// What the data have.
@@ -44,13 +53,34 @@ pub struct Columns {
     pub rows: usize,
     /// Smallest and largest coordinate of each joint.
     pub travel: Vec<[f64; 2]>,
+    /// Joints whose torque is not known to differ from zero in any reading.
+    pub upright: Vec<bool>,
     /// Candidates for a change point, as places in time.
     pub changes: Vec<usize>,
 }
 
 fn simple(kind: Kind, index: Option<usize>, shape: Shape, range: [f64; 2]) -> Hypothesis {
     let location = Location { level: kind.level(), index: index.map(|index| index + 1) };
-    Hypothesis { kind: Some(kind), location, shape, range, spread: vec![1.0], detail: String::new() }
+    Hypothesis { kind: Some(kind), location, shape, range, spread: vec![1.0], detail: String::new(), share: None }
+}
+
+/// A ripple of a joint that turns: `waves` periods per turn. Even counts are twice the ratio of a strain-wave gear; others, and all where
+/// strain-wave errors are not to be named, have no name.
+#[must_use]
+pub fn ripple(joint: usize, waves: u16, nameless: bool) -> Hypothesis {
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let shape = Shape::Harmonic(joint, f64::from(waves));
+    let wave = simple(Kind::StrainWaveError, Some(joint), shape, [8.0 * ARCSEC, 40.0 * ARCSEC]);
+    let spread = vec![half; 2];
+    let (least, most) = (WAVES_PER_TURN[0], WAVES_PER_TURN[WAVES_PER_TURN.len() - 1]);
+    if nameless || waves % 2 == 1 || !(least..=most).contains(&waves) {
+        let detail = format!("{waves} periods per turn of joint {}", joint + 1);
+        return Hypothesis { kind: None, spread, detail, share: Some(1.0 / RIPPLES.len() as f64), ..wave };
+    }
+    let sold = WAVES_PER_TURN.contains(&waves);
+    let share =
+        if sold { (1.0 - OTHER_RATIOS) / WAVES_PER_TURN.len() as f64 } else { OTHER_RATIOS / f64::from((most - least) / 2) };
+    Hypothesis { spread, detail: format!("{waves} periods per turn"), share: Some(share), ..wave }
 }
 
 /// Everything that may be there in an arm like `mechanism`, seen through `columns`.
@@ -73,6 +103,14 @@ pub fn library(mechanism: &Mechanism, columns: &Columns) -> Vec<Hypothesis> {
             all.push(simple(Kind::Backlash, at, Shape::Direction(joint), width));
         }
         all.push(simple(Kind::GravityLostMotion, at, Shape::TorqueSign(joint), width));
+        if turns && columns.upright[joint] {
+            for step in 0..LEANS {
+                let azimuth = step as f64 * std::f64::consts::TAU / LEANS as f64;
+                let leaning = simple(Kind::GravityLostMotion, at, Shape::LeaningTorqueSign { joint, azimuth }, width);
+                let detail = format!("seated as if the axis leant towards {:.0}°", azimuth.to_degrees());
+                all.push(Hypothesis { detail, ..leaning });
+            }
+        }
         if turns {
             for order in [1.0, 2.0] {
                 let shape = Shape::Harmonic(joint, order);
@@ -80,10 +118,7 @@ pub fn library(mechanism: &Mechanism, columns: &Columns) -> Vec<Hypothesis> {
                 let eccentricity = simple(Kind::JointEccentricity, at, shape, [10.0 * ARCSEC, 100.0 * ARCSEC]);
                 all.push(Hypothesis { spread: vec![half; 2], detail, ..eccentricity });
             }
-            for waves in WAVES_PER_TURN {
-                let wave = simple(Kind::StrainWaveError, at, Shape::Harmonic(joint, waves), [8.0 * ARCSEC, 40.0 * ARCSEC]);
-                all.push(Hypothesis { spread: vec![half; 2], detail: format!("{waves} periods per turn"), ..wave });
-            }
+            all.extend(WAVES_PER_TURN.map(|waves| ripple(joint, waves, false)));
         }
         // Motion leaks from the joint before, whose drive shares the housing; the first has none before it.
         let before = if joint == 0 { 1.min(count - 1) } else { joint - 1 };
@@ -115,27 +150,59 @@ pub fn library(mechanism: &Mechanism, columns: &Columns) -> Vec<Hypothesis> {
         all.push(Hypothesis { spread: twist.clone(), ..simple(Kind::BaseDrift, None, Shape::BaseDrift, [15e-6, 80e-6]) });
     }
     let tool = if columns.attitude { twist.clone() } else { vec![third; 3] };
+    if columns.time {
+        courses(&twist, &tool, &mut all);
+    }
     for row in &columns.changes {
         all.push(Hypothesis { spread: twist.clone(), ..simple(Kind::BaseStep, None, Shape::BaseStep(*row), [15e-6, 80e-6]) });
         all.push(Hypothesis { spread: tool.clone(), ..simple(Kind::ToolStep, None, Shape::ToolStep(*row), [0.05e-3, 0.5e-3]) });
     }
     all.push(Hypothesis {
         kind: None,
-        location: Location { level: crate::effects::Level::Tool, index: None },
+        location: Location { level: Level::Tool, index: None },
         shape: Shape::AllYield,
         range: [2e-5, 1.5e-4],
         spread: vec![1.0; 2],
         detail: "all joints yield, as under a payload that is not the recorded one".to_owned(),
+        share: None,
     });
     all.push(simple(Kind::MeasurementScale, None, Shape::Scale, [10e-6, 100e-6]));
     all
 }
 
+/// The base or the tool goes neither steadily nor at once.
+fn courses(base: &[f64], tool: &[f64], all: &mut Vec<Hypothesis>) {
+    let ramps = [0.15, 0.38, 0.62, 0.85].map(|centre| Course::Ramp { centre, width: 0.3 });
+    let gradual = Course::Ramp { centre: 0.5, width: 0.8 };
+    let mut push = |shape: Shape, range: [f64; 2], spread: &[f64], detail: String| {
+        let level = if matches!(shape, Shape::BaseCourse(_)) { Level::Base } else { Level::Tool };
+        let location = Location { level, index: None };
+        all.push(Hypothesis { kind: None, location, shape, range, spread: spread.to_vec(), detail, share: None });
+    };
+    for course in ramps.into_iter().chain([gradual, Course::Return, Course::Steady]) {
+        let how = match course {
+            Course::Ramp { centre, width } => {
+                format!(
+                    "moves between {:.0} and {:.0} % of the session",
+                    100.0 * (centre - width / 2.0),
+                    100.0 * (centre + width / 2.0)
+                )
+            }
+            Course::Return => "moves away and comes back".to_owned(),
+            Course::Steady => "moves steadily".to_owned(),
+        };
+        if course != Course::Steady {
+            push(Shape::BaseCourse(course), [15e-6, 80e-6], base, format!("the base or the sensor {how}"));
+        }
+        push(Shape::ToolCourse(course), [0.05e-3, 0.5e-3], tool, format!("the tool {how}"));
+    }
+}
+
 /// Shapes that no kind has: where one wins, the cause is unknown.
 fn nameless(joint: usize, turns: bool, columns: &Columns, all: &mut Vec<Hypothesis>) {
-    let location = Location { level: crate::effects::Level::Joint, index: Some(joint + 1) };
+    let location = Location { level: Level::Joint, index: Some(joint + 1) };
     let mut push = |shape: Shape, range: [f64; 2], spread: Vec<f64>, detail: String| {
-        all.push(Hypothesis { kind: None, location, shape, range, spread, detail });
+        all.push(Hypothesis { kind: None, location, shape, range, spread, detail, share: None });
     };
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let angle = [20.0 * ARCSEC, 160.0 * ARCSEC];
@@ -167,6 +234,17 @@ fn nameless(joint: usize, turns: bool, columns: &Columns, all: &mut Vec<Hypothes
             push(Shape::Crosstalk { joint, moving }, [0.3e-5, 3e-5], vec![half; 2], detail);
         }
     }
+    let detail = |how: &str| format!("moment across the axis of joint {} turns its link, {how}", joint + 1);
+    push(Shape::UnequalBend(joint), [0.5e-5, 5e-5], vec![1.0; 2], detail("about one axis more than about another"));
+    push(
+        Shape::UnequalSeat(joint),
+        [20e-6, 200e-6],
+        vec![1.0; 2],
+        detail("whatever its size, about one axis more than about another"),
+    );
+    let unequally = format!("force across the axis of joint {} shifts it, more one way than another", joint + 1);
+    push(Shape::UnequalShift(joint), [10e-6, 60e-6], vec![1.0; 2], unequally);
+    push(Shape::RootAcross(joint), [1e-5, 1e-4], vec![1.0], detail("not in proportion"));
     let detail = format!("turn of joint {} not proportional to its torque", joint + 1);
     push(Shape::Softening(joint), [2e-5, 2e-4], vec![1.0, 0.5], detail.clone());
     push(Shape::Hardening(joint), [2e-5, 2e-4], vec![1.0; 2], detail);

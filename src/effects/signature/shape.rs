@@ -44,6 +44,26 @@ pub enum Shape {
         /// Share.
         held: f64,
     },
+    /// \[1\] As [`Shape::TorqueSign`], where gravity is not along the nominal direction but leans (rad) towards an azimuth about the
+    /// joint's axis: what decides the side that an upright joint's play is seated on.
+    LeaningTorqueSign {
+        /// The joint.
+        joint: usize,
+        /// rad, from the first axis across ([`across`]).
+        azimuth: f64,
+    },
+    /// \[2\] A turn about a joint's origin: the moments about the x and y axes of its link bend it unequally.
+    UnequalBend(usize),
+    /// \[2\] A turn about a joint's origin: the moment across seats it, about the x and y axes of its link unequally.
+    UnequalSeat(usize),
+    /// \[2\] A shift: the force across a joint seats it, along the x and y axes of its link unequally.
+    UnequalShift(usize),
+    /// \[1\] A turn about a joint's origin along the moment across its axis, with the root of its size.
+    RootAcross(usize),
+    /// \[6\] A twist of the base over a course of time.
+    BaseCourse(Course),
+    /// \[3, 6 with attitudes\] A twist of the tool over a course of time.
+    ToolCourse(Course),
     /// \[6\] A twist of the base in proportion to time.
     BaseDrift,
     /// \[6\] A twist of the base from a row on.
@@ -94,6 +114,35 @@ pub enum Shape {
     Memory(usize, f64),
     /// \[2\] A joint turns with time and its square.
     TimeCurve(usize),
+}
+
+/// How something goes with the share of the session that has passed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Course {
+    /// From 0 to 1 about a moment, along a raised cosine that is so wide.
+    Ramp {
+        /// Middle, share of the session.
+        centre: f64,
+        /// Whole width, share of the session.
+        width: f64,
+    },
+    /// There and back: half a sine.
+    Return,
+    /// In proportion.
+    Steady,
+}
+
+impl Course {
+    /// At the share `share` of the session.
+    #[must_use]
+    pub fn at(self, share: f64) -> f64 {
+        use std::f64::consts::PI;
+        match self {
+            Course::Ramp { centre, width } => 0.5 * (1.0 + libm::sin(PI * ((share - centre) / width).clamp(-0.5, 0.5))),
+            Course::Return => libm::sin(PI * share),
+            Course::Steady => share,
+        }
+    }
 }
 
 /// A row of measurements as signatures see it.
@@ -198,6 +247,33 @@ impl Shape {
                 let (load, sigma) = (posture.moment_across(joint), posture.moment_sigma(joint));
                 vec![reading.turned(joint, seated(load, sigma, held * posture.forces[joint].norm() * posture.reaches[joint]))]
             }
+            Shape::LeaningTorqueSign { joint, azimuth } => {
+                // First moment of the mass outboard, across gravity; where gravity leans towards `lean` the torque follows `lean · lever`.
+                let gravity = reading.gravity;
+                let lever = gravity.cross(&posture.moments[joint]);
+                let (x, y) = across(&posture.axes[joint]);
+                let lean = x * libm::cos(azimuth) + y * libm::sin(azimuth);
+                let share = lean.dot(&lever) / lever.norm().max(1e-12);
+                vec![reading.moved(joint, 0.5 * share / libm::hypot(share, LEAN_EDGE))]
+            }
+            Shape::UnequalBend(joint) => {
+                let moment = posture.moment_across(joint);
+                across_link(posture, joint).map(|axis| reading.turned(joint, axis * axis.dot(&moment))).to_vec()
+            }
+            Shape::UnequalSeat(joint) => {
+                let seat = seated(posture.moment_across(joint), posture.moment_sigma(joint), 0.0);
+                across_link(posture, joint).map(|axis| reading.turned(joint, axis * axis.dot(&seat))).to_vec()
+            }
+            Shape::UnequalShift(joint) => {
+                let seat = seated(posture.force_across(joint), posture.force_sigma(joint), 0.0);
+                across_link(posture, joint).map(|axis| twist(axis * axis.dot(&seat), Vector3::zeros())).to_vec()
+            }
+            Shape::RootAcross(joint) => {
+                let moment = posture.moment_across(joint);
+                vec![reading.turned(joint, moment / libm::sqrt(moment.norm().max(1e-9)))]
+            }
+            Shape::BaseCourse(course) => base_twist(reading, course.at(reading.share)),
+            Shape::ToolCourse(course) => tool_twist(reading, course.at(reading.share), attitude),
             Shape::BaseDrift => base_twist(reading, reading.share),
             Shape::BaseStep(row) => base_twist(reading, f64::from(u8::from(reading.order >= row))),
             Shape::ToolStep(row) => tool_twist(reading, f64::from(u8::from(reading.order >= row)), attitude),
@@ -273,12 +349,15 @@ impl Shape {
             | Shape::Crosstalk { .. }
             | Shape::Softening(_)
             | Shape::Hardening(_)
+            | Shape::UnequalBend(_)
+            | Shape::UnequalSeat(_)
+            | Shape::UnequalShift(_)
             | Shape::AllYield
             | Shape::TimeCurve(_) => 2,
             Shape::AngleCurve(_) => 3,
             Shape::AngleMap { .. } => MAP_ORDERS,
-            Shape::BaseDrift | Shape::BaseStep(_) => 6,
-            Shape::ToolStep(_) => {
+            Shape::BaseDrift | Shape::BaseStep(_) | Shape::BaseCourse(_) => 6,
+            Shape::ToolStep(_) | Shape::ToolCourse(_) => {
                 if attitude {
                     6
                 } else {
@@ -298,6 +377,23 @@ fn seated(load: Vector3<f64>, sigma: f64, friction: f64) -> Vector3<f64> {
     let edge = libm::hypot(sigma, 0.15 * friction).max(1e-9);
     let free = if friction > 0.0 { (0.5 + 0.5 * (size - friction) / edge).clamp(0.0, 1.0) } else { 1.0 };
     load * free / libm::hypot(size, sigma).max(1e-9)
+}
+
+/// Share of the largest torque below which nobody knows on which side a leaning joint's play is seated: the azimuth of the lean is
+/// known to half a step between those that are tried.
+const LEAN_EDGE: f64 = 0.15;
+
+/// Two directions across `axis` that do not turn with the joint.
+#[must_use]
+pub fn across(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    let other = if axis.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
+    let y = axis.cross(&other).normalize();
+    (y.cross(axis), y)
+}
+
+/// The x and y axes of the frame that moves with `joint`.
+fn across_link(posture: &Posture, joint: usize) -> [Vector3<f64>; 2] {
+    [0, 1].map(|axis| posture.frames[joint].column(axis).into())
 }
 
 fn base_twist(reading: &Reading, factor: f64) -> Vec<Displacement> {

@@ -1,0 +1,102 @@
+//! A periodogram of what remains, against each joint's angle: gear ripple of any tooth count, which a library that lists them all at
+//! every joint would pay for in each (Lomb and Scargle's, along the joint's motion and with the geometry fitted beside it).
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::evidence::Candidates;
+use super::held_out::Problem;
+use crate::effects::signature::library::RIPPLES;
+use crate::effects::signature::shape::{Reading, Shape};
+
+/// Drop of the residual's square, in squares of the noise, from which on a ripple is worth a hypothesis: what the strongest of some
+/// thousands of ripples reaches by chance.
+const WORTH: f64 = 16.0;
+/// Ripples taken from one scan.
+const MOST: usize = 3;
+
+/// A ripple found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Ripple {
+    /// The joint, from 0.
+    pub(super) joint: usize,
+    /// Periods per turn.
+    pub(super) waves: u16,
+    /// By how much the residual's square drops, in squares of the noise.
+    pub(super) drop: f64,
+}
+
+/// The strongest ripple of each joint in `residual` (m, rad), whose noise has the mean square `level` in declared sigmas; the strongest
+/// first, none that is weak or a candidate already.
+pub(super) fn scan(
+    problem: &Problem,
+    readings: &[Reading],
+    residual: &DVector<f64>,
+    level: f64,
+    candidates: &Candidates,
+) -> Vec<Ripple> {
+    use rayon::prelude::*;
+    let geometry = problem.geometry;
+    let mut jacobian = problem.raw.columns(0, geometry).into_owned();
+    for (equation, mut row) in jacobian.row_iter_mut().enumerate() {
+        row *= problem.whitening[equation];
+    }
+    let jacobian = jacobian.transpose();
+    let Some(normal) = Cholesky::new(&jacobian * jacobian.transpose() + DMatrix::identity(geometry, geometry)) else {
+        return Vec::new();
+    };
+    let lower = normal.l();
+    let joints = readings.first().map_or(0, |reading| reading.joints.len());
+    let known = |joint: usize, waves: u16| {
+        candidates.hypotheses.iter().any(|hypothesis| hypothesis.shape == Shape::Harmonic(joint, f64::from(waves)))
+    };
+    let mut found: Vec<Ripple> = (0..joints)
+        .into_par_iter()
+        .filter(|joint| !readings[0].slides[*joint])
+        .filter_map(|joint| {
+            let per_row = problem.per_row;
+            // Of each reading: what a unit turn of the joint does, against geometry, itself and the residual.
+            let mut mixed = DMatrix::zeros(geometry, readings.len());
+            let (mut own, mut with) = (vec![0.0; readings.len()], vec![0.0; readings.len()]);
+            for (row, reading) in readings.iter().enumerate() {
+                let moved = reading.moved(joint, 1.0);
+                for (axis, value) in moved.iter().take(per_row).enumerate() {
+                    let equation = row * per_row + axis;
+                    let weight = problem.whitening[equation];
+                    let value = value * weight;
+                    own[row] += value * value;
+                    with[row] += value * residual[equation] * weight;
+                    mixed.column_mut(row).axpy(value, &jacobian.column(equation), 1.0);
+                }
+            }
+            let absorbed = lower.solve_lower_triangular(&mixed)?;
+            let drop = |waves: u16| -> f64 {
+                let mut wave = DMatrix::zeros(readings.len(), 2);
+                for (row, reading) in readings.iter().enumerate() {
+                    let (sine, cosine) = libm::sincos(f64::from(waves) * reading.joints[joint]);
+                    (wave[(row, 0)], wave[(row, 1)]) = (cosine, sine);
+                }
+                let taken = &absorbed * &wave;
+                let product = |a: usize, b: usize| -> f64 {
+                    let all: f64 = (0..readings.len()).map(|row| wave[(row, a)] * wave[(row, b)] * own[row]).sum();
+                    all - taken.column(a).dot(&taken.column(b))
+                };
+                let right = [0, 1].map(|a| (0..readings.len()).map(|row| wave[(row, a)] * with[row]).sum::<f64>());
+                let (aa, ab, bb) = (product(0, 0), product(0, 1), product(1, 1));
+                let determinant = aa * bb - ab * ab;
+                // Where both are nearly one thing, or geometry, there is no ripple to be seen.
+                if determinant <= 1e-6 * aa * bb || aa <= 0.0 || bb <= 0.0 {
+                    return 0.0;
+                }
+                (bb * right[0] * right[0] - 2.0 * ab * right[0] * right[1] + aa * right[1] * right[1]) / determinant / level
+            };
+            RIPPLES
+                .map(|waves| Ripple { joint, waves, drop: drop(waves) })
+                .filter(|one| one.drop >= WORTH)
+                .max_by(|a, b| a.drop.total_cmp(&b.drop).then(b.waves.cmp(&a.waves)))
+        })
+        .filter(|one| !known(one.joint, one.waves))
+        .collect();
+    found.sort_by(|a, b| b.drop.total_cmp(&a.drop).then(a.joint.cmp(&b.joint)));
+    found.truncate(MOST);
+    found
+}
