@@ -141,7 +141,9 @@ pub(crate) enum ChallengeCommand {
         kincal challenge score blind --baseline none\n  \
         kincal challenge score blind --verdicts mine        verdicts of another tool: mine/case-0001.json …\n\n\
         A verdict is what `kincal diagnose --json` prints; needed of it: verdict, effects [{kind, location {level, index}, probability,\n\
-        magnitude {value, unit, ci95}}], confusion_sets, unknown {present}.")]
+        magnitude {value, unit, ci95}}], confusion_sets, unknown {present}.\n\n\
+        Where the folder withholds kinds, kincal then diagnoses every case again with its whole library (DIR/restored/) and prints how\n\
+        often the kind is found once it is back, and how much of the held-out gap closes over a diagnosis told the truth.")]
     Score(ScoreOptions),
     /// Check by simulation the minimum detectable magnitudes that `kincal diagnose` states
     #[command(after_help = "Examples:\n  \
@@ -182,7 +184,7 @@ pub(crate) struct NewOptions {
     /// Of them, second readings of a configuration [default: a sixth]
     #[arg(long, value_name = "N")]
     pub(crate) repeats: Option<usize>,
-    /// Kinds that whoever diagnoses must not use; they are drawn, and are to be called unknown
+    /// Kinds that whoever diagnoses must not use; they are drawn, and are to be called unknown (`score` puts them back afterwards)
     #[arg(long, value_name = "KIND", value_delimiter = ',')]
     pub(crate) withheld: Vec<String>,
     /// Scene with the arm and the cell, in place of the eight-joint arm; what it injects is left out

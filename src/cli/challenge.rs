@@ -16,7 +16,7 @@ use crate::effects::{Kind, Location};
 use crate::experiments::arms::arm8;
 use crate::experiments::bench::Watcher;
 use crate::experiments::challenge::folder::{self, COMMITMENT, MANIFEST, SEAL};
-use crate::experiments::challenge::score::{self, Closure, closes};
+use crate::experiments::challenge::score::{self, closes, restorable};
 use crate::experiments::challenge::verdict::{Diagnose, Gap, Verdict, nothing};
 use crate::experiments::challenge::{CaseTruth, Folder, Options, TrueEffect, case};
 use crate::experiments::injection::Sort;
@@ -42,7 +42,7 @@ fn diagnosed(case: &folder::Case) -> Result<serde_json::Value, String> {
     diagnosed_among(case, None)
 }
 
-/// The same, of nothing but some kinds at some places.
+/// What `kincal diagnose` says of a case, of nothing but some kinds at some places.
 fn diagnosed_among(case: &folder::Case, only: Option<Vec<(Kind, Location)>>) -> Result<serde_json::Value, String> {
     let scene = crate::scene::parse(&case.start.scene, &case.name).map_err(|error| error.to_string())?.scene;
     let rows: Vec<_> = case.measurements.iter().collect();
@@ -233,32 +233,34 @@ fn scored(global: &Global, options: &ScoreOptions) -> anyhow::Result<Outcome> {
                     BASELINE
                 }
             };
-            let progress = Progress::new(global);
-            progress.begin("diagnosing", count);
-            let diagnosed: Vec<(serde_json::Value, f64)> = (0..count)
-                .into_par_iter()
-                .map(|index| {
-                    let case = folder.case(index)?;
-                    let start = Instant::now();
-                    let verdict = diagnose(&case).map_err(|why| anyhow::anyhow!("{}: {why}", case.path.display()))?;
-                    progress.step();
-                    Ok((verdict, start.elapsed().as_secs_f64()))
-                })
-                .collect::<anyhow::Result<_>>()?;
-            progress.end();
-            // Before the seal is opened.
-            for (case, (verdict, _)) in folder.manifest.cases.iter().zip(&diagnosed) {
-                let path = folder.path.join("verdicts").join(case.file.replace(".mcap", ".json"));
-                output::write(&path, &format!("{}\n", serde_json::to_string_pretty(verdict)?))?;
-            }
-            seconds = diagnosed.iter().map(|(_, seconds)| *seconds).collect();
-            let read = |(verdict, _)| serde_json::from_value(verdict).context("the diagnosis is no verdict");
-            (who.to_owned(), diagnosed.into_iter().map(read).collect::<anyhow::Result<_>>()?)
+            let all = diagnoses(global, &folder, diagnose, "diagnosing", "verdicts")?;
+            seconds = all.iter().map(|(_, seconds)| *seconds).collect();
+            (who.to_owned(), all.into_iter().map(|(verdict, _)| verdict).collect())
         }
     };
+    // What was withheld is put back; of another tool nobody can ask that.
+    let whole = folder.whole();
+    let own = options.verdicts.is_none() && options.baseline.is_none();
+    let restored: Option<Vec<Verdict>> = match diagnosis().filter(|_| own && !folder.manifest.withheld.is_empty()) {
+        Some((_, diagnose)) => {
+            let all = diagnoses(global, &whole, diagnose, "restoring", "restored")?;
+            Some(all.into_iter().map(|(verdict, _)| verdict).collect())
+        }
+        None => None,
+    };
     let sealed = folder.unseal()?;
-    let mut score = score::score(&sealed.cases, &verdicts, &folder.manifest.withheld);
-    score.closure = closure(global, &folder, &sealed.cases, &verdicts)?;
+    let withheld = &folder.manifest.withheld;
+    let mut score = score::score(&sealed.cases, &verdicts, withheld);
+    let told = told(global, &whole, &sealed.cases, &|index| {
+        let truth = &sealed.cases[index];
+        closes(truth, withheld) && verdicts[index].gap.is_some() || restored.is_some() && restorable(truth, withheld)
+    })?;
+    let pairs: Vec<(Gap, Gap)> = (0..count)
+        .filter(|index| closes(&sealed.cases[*index], withheld))
+        .filter_map(|index| verdicts[index].gap.zip(told[index]))
+        .collect();
+    score.closure = (!pairs.is_empty()).then(|| score::closure(&pairs));
+    score.restored = restored.map(|restored| score::restored(&sealed.cases, [&verdicts, &restored], &told, withheld));
     let text = report::challenge::score(&score, &who, &seconds);
     let figure = report::challenge::figure(&score);
     let mut written = Vec::new();
@@ -284,34 +286,67 @@ fn scored(global: &Global, options: &ScoreOptions) -> anyhow::Result<Outcome> {
     Ok(Outcome::Good)
 }
 
-/// What verdicts close of the gap, over what kincal's diagnosis does that looks for nothing but what is there. `None` where no verdict
-/// says what it closes, or no case has what should be closed.
-fn closure(global: &Global, folder: &Folder, truths: &[CaseTruth], verdicts: &[Verdict]) -> anyhow::Result<Option<Closure>> {
-    let withheld = &folder.manifest.withheld;
-    let asked: Vec<(usize, Gap)> = (0..truths.len())
-        .filter(|index| closes(&truths[*index], withheld))
-        .filter_map(|index| Some((index, verdicts[index].gap?)))
-        .collect();
-    if asked.is_empty() {
-        return Ok(None);
+/// Diagnoses every case, side by side, and writes what is said of each into `name` within the folder: before the seal is opened. With
+/// every verdict the seconds it took.
+fn diagnoses(
+    global: &Global,
+    folder: &Folder,
+    diagnose: Diagnose,
+    doing: &'static str,
+    name: &str,
+) -> anyhow::Result<Vec<(Verdict, f64)>> {
+    let count = folder.manifest.cases.len();
+    let progress = Progress::new(global);
+    progress.begin(doing, count);
+    let said: Vec<(serde_json::Value, f64)> = (0..count)
+        .into_par_iter()
+        .map(|index| {
+            let case = folder.case(index)?;
+            let start = Instant::now();
+            let verdict = diagnose(&case).map_err(|why| anyhow::anyhow!("{}: {why}", case.path.display()))?;
+            progress.step();
+            Ok((verdict, start.elapsed().as_secs_f64()))
+        })
+        .collect::<anyhow::Result<_>>()?;
+    progress.end();
+    for (case, (verdict, _)) in folder.manifest.cases.iter().zip(&said) {
+        let path = folder.path.join(name).join(case.file.replace(".mcap", ".json"));
+        output::write(&path, &format!("{}\n", serde_json::to_string_pretty(verdict)?))?;
+    }
+    let read = |(verdict, seconds)| Ok((serde_json::from_value(verdict).context("the diagnosis is no verdict")?, seconds));
+    said.into_iter().map(read).collect()
+}
+
+/// Of each case that is `asked`, the gap of kincal's diagnosis that looks for nothing but what is there.
+fn told(
+    global: &Global,
+    folder: &Folder,
+    truths: &[CaseTruth],
+    asked: &(dyn Fn(usize) -> bool + Sync),
+) -> anyhow::Result<Vec<Option<Gap>>> {
+    let count = (0..truths.len()).filter(|index| asked(*index)).count();
+    if count == 0 {
+        return Ok(vec![None; truths.len()]);
     }
     let progress = Progress::new(global);
-    progress.begin("knowing", asked.len());
-    let pairs: Vec<(Gap, Gap)> = asked
+    progress.begin("knowing", count);
+    let gaps = (0..truths.len())
         .into_par_iter()
-        .map(|(index, own)| {
+        .map(|index| {
+            if !asked(index) {
+                return Ok(None);
+            }
             let case = folder.case(index)?;
             let is = |effect: &TrueEffect| Some((Kind::from_name(&effect.kind)?, effect.location));
             let only = truths[index].effects.iter().filter_map(is).collect();
             let found = diagnosed_among(&case, Some(only)).map_err(|why| anyhow::anyhow!("{}: {why}", case.path.display()))?;
             let found: Verdict = serde_json::from_value(found).context("the diagnosis is no verdict")?;
             progress.step();
-            Ok(found.gap.map(|best| (own, best)))
+            Ok(found.gap)
         })
-        .filter_map(anyhow::Result::transpose)
         .collect::<anyhow::Result<_>>()?;
     progress.end();
-    Ok(Some(score::closure(&pairs)))
+    Ok(gaps)
 }
 
 #[cfg(test)]

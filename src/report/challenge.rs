@@ -1,7 +1,7 @@
 //! The score of a diagnosis: tables for people, one for CSV, and the reliability plot.
 
 use super::table;
-use crate::experiments::challenge::score::{Confusion, LAMBDA, Score, Single};
+use crate::experiments::challenge::score::{ANY, Confusion, LAMBDA, NOT_THERE, Restored, Score, Single};
 use crate::figure::{Axis, Colour, Estimate, Figure, Kind, Panel, Series};
 
 /// `97 % (31/32)`.
@@ -98,6 +98,10 @@ pub fn score(score: &Score, who: &str, seconds: &[f64]) -> String {
     });
     text.push_str(&table(&["kind not to be known", "cases", "flagged unknown", "misnamed"], foreign.collect()));
     text.push('\n');
+    if let Some(rows) = &score.restored {
+        text.push_str(&restored(rows));
+        text.push('\n');
+    }
     let sizes = score
         .magnitudes
         .iter()
@@ -131,7 +135,7 @@ pub fn score(score: &Score, who: &str, seconds: &[f64]) -> String {
     if let Some(closure) = &score.closure {
         text.push_str(&format!(
             "Held-out gap closed over what one closes who knows the effects: median {}, mean {}, 90 % or more in {} ({} cases, each \
-             effect known with λ ≥ 40; {} more in which who knows closes nothing).\n",
+             effect known with λ ≥ 40; {} more in which who knows closes next to nothing).\n",
             percent(closure.median),
             percent(closure.mean),
             share(closure.nearly_all, closure.cases),
@@ -153,6 +157,59 @@ pub fn score(score: &Score, who: &str, seconds: &[f64]) -> String {
          confidently: 0.95 or more. Right place: of those with the right kind. Shares are of the cases of their row.\n",
     );
     text
+}
+
+/// What becomes of the cases once the kinds that were withheld are put back.
+fn restored(rows: &[Restored]) -> String {
+    let kinds: std::collections::BTreeSet<&str> =
+        rows.iter().map(|row| row.kind.as_str()).filter(|kind| ![ANY, NOT_THERE].contains(kind)).collect();
+    let rms = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| format!("{:.1}", 1e6 * value));
+    // Rows of a kind say nothing new where there is only one, nor does their sum where one bin has all of it.
+    let again = |row: &Restored| {
+        let same = |other: &Restored| other.kind == row.kind && other.lambda != row.lambda && other.cases == row.cases;
+        kinds.len() < 2 || row.lambda == "all" && rows.iter().any(same)
+    };
+    let shown = rows.iter().filter(|row| row.kind == ANY || row.cases > 0 && (row.kind == NOT_THERE || !again(row)));
+    let lines = shown.map(|row| {
+        let closure = row.closure.as_ref();
+        vec![
+            match row.kind.as_str() {
+                ANY => row.lambda.clone(),
+                NOT_THERE => NOT_THERE.to_owned(),
+                kind => format!("{kind}, {}", row.lambda),
+            },
+            row.cases.to_string(),
+            row.right.map_or_else(|| "–".to_owned(), |right| share(right, row.cases)),
+            share(row.wrong, row.cases),
+            share(row.unknown, row.cases),
+            percent(closure.and_then(|closure| closure.median)),
+            percent(closure.and_then(|closure| closure.mean)),
+            closure.map_or_else(|| "–".to_owned(), |closure| closure.cases.to_string()),
+            match [row.geometry_rms_m, row.withheld_rms_m, row.restored_rms_m, row.noise_rms_m] {
+                [None, None, None, None] => "–".to_owned(),
+                chain => chain.map(rms).join(" → "),
+            },
+        ]
+    });
+    let header = [
+        "put back",
+        "cases",
+        "right kind and place",
+        "anything wrong",
+        "still unknown",
+        "gap closed",
+        "mean",
+        "of",
+        "held out, µm",
+    ];
+    format!(
+        "Withheld, then put back: {}\n{}\nGap closed: of what a diagnosis closes on held-out poses that is told the effects, median and mean \
+         of so many cases; in the others\nit closes next to nothing, or something is outside the library. Held out: median RMS, geometry → \
+         with what the library without the kind\nchose → with the kind back → noise. Of several effects in a case all withheld ones must be \
+         right, the largest λ counts, and the gap is that of all.\n",
+        kinds.iter().copied().collect::<Vec<_>>().join(", "),
+        table(&header, lines.collect())
+    )
 }
 
 /// Which kind was named for which in cases whose λ is in the bin `lambda`; kinds have numbers so that columns are narrow.

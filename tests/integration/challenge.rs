@@ -223,6 +223,42 @@ fn the_scorer_can_fail_and_can_succeed() {
 }
 
 #[test]
+fn what_was_withheld_closes_the_gap_once_it_is_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let arguments = ["--cases", "3", "--poses", "40", "--noise", "20", "--effects", "1", "--kinds", "backlash"];
+    new(path, &[&arguments[..], &["--withheld", "backlash"]].concat()).ends(0);
+    let first = score(path, &["--json"]).ends(0).json();
+    let again = score(path, &["--json", "--threads", "1"]).ends(0).json();
+    assert_eq!(first["score"], again["score"]);
+    let said = |folder: &str, case: &str| -> Value {
+        serde_json::from_str(&fs::read_to_string(path.join(folder).join(case)).unwrap()).unwrap()
+    };
+    let names_backlash = |folder: &str| {
+        let named = |case: &&String| said(folder, case)["effects"].as_array().unwrap().iter().any(|it| it["kind"] == "backlash");
+        names(&path.join(folder)).iter().filter(named).count()
+    };
+    assert_eq!((names_backlash("verdicts"), names(&path.join("restored")).len()), (0, 3));
+    let rows = first["score"]["restored"].as_array().unwrap();
+    let row = |kind: &str, lambda: &str| rows.iter().find(|row| row["kind"] == kind && row["lambda"] == lambda).unwrap();
+    let all = row("any", "all");
+    assert_eq!(all, &{
+        let mut same = row("backlash", "all").clone();
+        same["kind"] = "any".into();
+        same
+    });
+    assert_eq!(number(all, "/cases"), 3.0);
+    assert!(number(all, "/right") >= 2.0 && number(all, "/right") <= names_backlash("restored") as f64, "{all}");
+    assert!(number(all, "/closure/median") > 0.9, "{all}");
+    let rms = ["geometry", "withheld", "restored", "noise"].map(|name| number(all, &format!("/{name}_rms_m")));
+    assert!(rms[2] < rms[0] && rms[2] < rms[1] && rms[3] > 0.0, "{rms:?}");
+    assert_eq!(number(row("not there", "all"), "/cases"), 0.0);
+    // Of somebody else's diagnosis that cannot be asked.
+    let baseline = score(path, &["--baseline", "none", "--json"]).ends(0).json();
+    assert!(baseline["score"]["restored"].is_null());
+}
+
+#[test]
 fn a_case_is_a_recording_like_any_other() {
     let folder = tempfile::tempdir().unwrap();
     new(folder.path(), &["--cases", "1", "--effects", "0"]).ends(0);

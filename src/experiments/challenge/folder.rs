@@ -268,6 +268,13 @@ impl Folder {
         Ok(Folder { path: path.to_owned(), manifest })
     }
 
+    /// The same cases with nothing withheld.
+    #[must_use]
+    pub fn whole(&self) -> Folder {
+        let manifest = Manifest { withheld: Vec::new(), ..self.manifest.clone() };
+        Folder { path: self.path.clone(), manifest }
+    }
+
     /// Case `index` as whoever diagnoses sees it.
     ///
     /// # Errors

@@ -4,6 +4,8 @@
 //! *right* where that effect's kind is named, *wrong* where another kind is named, *abstained* where none is. What is outside the
 //! library, or withheld, is to be *flagged* (`unknown_remains`, or something unknown present); whatever kind is named there that is not
 //! in the truth is *misnamed*.
+//!
+//! What was withheld can be put back: [`Restored`] says what the whole library names and closes of the same cases.
 
 use serde::Serialize;
 
@@ -18,6 +20,14 @@ const CONFIDENT: f64 = 0.95;
 const BINS: usize = 10;
 /// λ from which a foreign effect must be flagged.
 const FLAGGED_FROM: f64 = 60.0;
+/// Of the mean square that geometry leaves, what who knows the truth must close: chance closes less, and a share of it says nothing.
+const SOMETHING: f64 = 0.02;
+/// Bins of λ of what is put back.
+const RESTORED: [&str; 4] = ["λ < 60", "≥ 60", "no λ", "all"];
+/// In place of a kind: cases that have any of those withheld, and cases that have none.
+pub const ANY: &str = "any";
+/// See [`ANY`].
+pub const NOT_THERE: &str = "not there";
 
 /// Lower ends of the bins of λ, and their names.
 pub const LAMBDA: [(f64, &str); 5] =
@@ -51,6 +61,8 @@ pub struct Score {
     pub changes: Vec<Changes>,
     /// What the verdicts close of the held-out gap over what one closes who knows the truth; where that was asked for.
     pub closure: Option<Closure>,
+    /// What the whole library makes of the cases; where kinds were withheld and kincal diagnoses.
+    pub restored: Option<Vec<Restored>>,
     /// Which kind was named for which, by λ: truth, bin, named (or `nothing`, `unknown`, `a set`), cases.
     pub confusion: Vec<Confusion>,
 }
@@ -192,13 +204,12 @@ pub struct Changes {
     pub largest_of_90: Option<f64>,
 }
 
-/// What is closed of the held-out gap, over what one closes who knows which effects are there: cases with known effects only, each
-/// with λ ≥ 40.
+/// What is closed of the held-out gap, over what one closes who knows which effects are there: cases with effects of the library only.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Closure {
     /// Cases in which who knows closes something.
     pub cases: usize,
-    /// Cases in which that closes nothing.
+    /// Cases in which that closes next to nothing: less than 2 % of the mean square.
     pub nothing_to_close: usize,
     /// Of (geometry² − explained²) of the verdict over that of who knows.
     pub median: Option<f64>,
@@ -206,6 +217,33 @@ pub struct Closure {
     pub mean: Option<f64>,
     /// Cases with 0.9 or more.
     pub nearly_all: usize,
+}
+
+/// What becomes of cases when the kinds that were withheld are put back.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Restored {
+    /// Cases that have an effect of this kind; [`ANY`] of those withheld; [`NOT_THERE`]: none of them.
+    pub kind: String,
+    /// Bin of the λ of that effect, the largest where there are several.
+    pub lambda: String,
+    /// Cases.
+    pub cases: usize,
+    /// Every such effect named at its place; absent where there is none.
+    pub right: Option<usize>,
+    /// Something named that is not there, or not at that place; outliers are there where the noise has heavy tails.
+    pub wrong: usize,
+    /// Called unknown all the same.
+    pub unknown: usize,
+    /// What the whole library closes over what one closes who knows; absent where no case can tell.
+    pub closure: Option<Closure>,
+    /// Median 3-D RMS on held-out poses, geometry fitted, m.
+    pub geometry_rms_m: Option<f64>,
+    /// With what the library without the kinds chose.
+    pub withheld_rms_m: Option<f64>,
+    /// With the whole library.
+    pub restored_rms_m: Option<f64>,
+    /// What noise alone would leave.
+    pub noise_rms_m: Option<f64>,
 }
 
 /// How often a kind was taken for another.
@@ -293,6 +331,7 @@ pub fn score(truths: &[CaseTruth], verdicts: &[Verdict], withheld: &[String]) ->
         magnitudes: magnitudes(truths, verdicts),
         changes: changes(truths, verdicts),
         closure: None,
+        restored: None,
         confusion: confusion(truths, verdicts),
     }
 }
@@ -494,7 +533,7 @@ fn changes(truths: &[CaseTruth], verdicts: &[Verdict]) -> Vec<Changes> {
         .collect()
 }
 
-/// Whether a case is one of [`Closure`].
+/// Whether the score asks what a case's verdict closes: known effects only, each with λ ≥ 40.
 #[must_use]
 pub fn closes(truth: &CaseTruth, withheld: &[String]) -> bool {
     let known = |effect: &TrueEffect| effect.known && !withheld.contains(&effect.kind);
@@ -506,8 +545,9 @@ pub fn closes(truth: &CaseTruth, withheld: &[String]) -> bool {
 #[must_use]
 pub fn closure(pairs: &[(Gap, Gap)]) -> Closure {
     let closed = |gap: &Gap| gap.geometry_rms_m * gap.geometry_rms_m - gap.explained_rms_m * gap.explained_rms_m;
+    let something = |gap: &Gap| closed(gap) > SOMETHING * gap.geometry_rms_m * gap.geometry_rms_m;
     let mut shares: Vec<f64> =
-        pairs.iter().filter(|(_, best)| closed(best) > 0.0).map(|(own, best)| closed(own) / closed(best)).collect();
+        pairs.iter().filter(|(_, best)| something(best)).map(|(own, best)| closed(own) / closed(best)).collect();
     shares.sort_by(f64::total_cmp);
     Closure {
         cases: shares.len(),
@@ -516,6 +556,77 @@ pub fn closure(pairs: &[(Gap, Gap)]) -> Closure {
         mean: (!shares.is_empty()).then(|| shares.iter().sum::<f64>() / shares.len() as f64),
         nearly_all: shares.iter().filter(|share| **share >= 0.9).count(),
     }
+}
+
+/// Whether a case has what was withheld, and nothing that is outside the library: who knows can close its gap.
+#[must_use]
+pub fn restorable(truth: &CaseTruth, withheld: &[String]) -> bool {
+    truth.effects.iter().any(|effect| withheld.contains(&effect.kind)) && truth.effects.iter().all(|effect| effect.known)
+}
+
+/// The same cases diagnosed without the kinds `withheld` and with the whole library, `told` being the gap of who knows the truth where
+/// a case is [`restorable`]: by λ, by kind and λ, and those that have none of the kinds.
+#[must_use]
+pub fn restored(
+    truths: &[CaseTruth],
+    [without, whole]: [&[Verdict]; 2],
+    told: &[Option<Gap>],
+    withheld: &[String],
+) -> Vec<Restored> {
+    let there = |index: usize, kind: &str| {
+        let effects = truths[index].effects.iter();
+        effects.filter(|effect| withheld.contains(&effect.kind) && (kind == ANY || kind == effect.kind)).collect::<Vec<_>>()
+    };
+    let bin_of = |index: usize, kind: &str| {
+        let lambda = there(index, kind).iter().filter_map(|effect| effect.lambda).max_by(f64::total_cmp);
+        lambda.map_or(2, |lambda| usize::from(lambda >= FLAGGED_FROM))
+    };
+    let row = |kind: &str, lambda: &str, cases: &[usize]| {
+        let count = |is: &dyn Fn(usize) -> bool| cases.iter().filter(|index| is(**index)).count();
+        let right = |index: usize| {
+            let named = named(&whole[index]);
+            there(index, kind).iter().all(|effect| named.iter().any(|claim| is(claim, effect)))
+        };
+        let wrong = |index: usize| {
+            let truth = &truths[index];
+            named(&whole[index]).iter().any(|claim| {
+                let outliers = truth.noise.tails.is_some() && claim.kind == "measurement_outliers";
+                !outliers && !truth.effects.iter().any(|effect| is(claim, effect))
+            })
+        };
+        let pairs: Vec<(Gap, Gap)> = cases.iter().filter_map(|index| whole[*index].gap.zip(told[*index])).collect();
+        let rms = |verdicts: &[Verdict], of: &dyn Fn(Gap) -> Option<f64>| {
+            let mut all: Vec<f64> = cases.iter().filter_map(|index| verdicts[*index].gap.and_then(of)).collect();
+            all.sort_by(f64::total_cmp);
+            median(&all)
+        };
+        Restored {
+            kind: kind.to_owned(),
+            lambda: lambda.to_owned(),
+            cases: cases.len(),
+            right: (kind != NOT_THERE).then(|| count(&right)),
+            wrong: count(&wrong),
+            unknown: count(&|index| flagged(&whole[index])),
+            closure: (kind != NOT_THERE && !pairs.is_empty()).then(|| closure(&pairs)),
+            geometry_rms_m: rms(whole, &|gap| Some(gap.geometry_rms_m)),
+            withheld_rms_m: rms(without, &|gap| Some(gap.explained_rms_m)),
+            restored_rms_m: rms(whole, &|gap| Some(gap.explained_rms_m)),
+            noise_rms_m: rms(whole, &|gap| gap.noise_rms_m),
+        }
+    };
+    let mut kinds: Vec<&str> = withheld.iter().map(String::as_str).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    let all = || 0..truths.len();
+    let mut rows = Vec::new();
+    for kind in [ANY].into_iter().chain(kinds) {
+        for (bin, lambda) in RESTORED.into_iter().enumerate() {
+            let inside = |index: &usize| !there(*index, kind).is_empty() && (bin == 3 || bin_of(*index, kind) == bin);
+            rows.push(row(kind, lambda, &all().filter(inside).collect::<Vec<_>>()));
+        }
+    }
+    rows.push(row(NOT_THERE, RESTORED[3], &all().filter(|index| there(*index, ANY).is_empty()).collect::<Vec<_>>()));
+    rows
 }
 
 fn confusion(truths: &[CaseTruth], verdicts: &[Verdict]) -> Vec<Confusion> {
@@ -691,16 +802,73 @@ mod tests {
 
     #[test]
     fn the_gap_is_measured_by_who_knows_the_truth() {
-        let gap = |before: f64, after: f64| Gap { geometry_rms_m: before, explained_rms_m: after };
+        let gap = |before: f64, after: f64| Gap { geometry_rms_m: before, explained_rms_m: after, noise_rms_m: None };
         let best = gap(5.0, 3.0);
         let found =
             closure(&[(gap(5.0, 3.0), best), (gap(5.0, 5.0), best), (gap(5.0, 17.0_f64.sqrt()), best), (best, gap(3.0, 4.0))]);
         assert_eq!((found.cases, found.nothing_to_close, found.nearly_all), (3, 1, 1));
+        // Hardly anything to close is nothing: a share of it would say what chance does.
+        assert_eq!(closure(&[(gap(5.0, 4.0), gap(5.0, 4.99))]).mean, None);
         assert!((found.median.unwrap() - 0.5).abs() < 1e-12 && (found.mean.unwrap() - 0.5).abs() < 1e-12);
         let truths = truths();
         let closing: Vec<bool> = truths.iter().map(|truth| closes(truth, &[])).collect();
         assert_eq!(closing, [true, false, true, false, false, false]);
         assert!(!closes(&truths[0], &["radial_clearance".to_owned()]));
+    }
+
+    #[test]
+    fn what_was_withheld_is_put_back() {
+        let withheld = ["backlash", "measurement_outliers"].map(str::to_owned);
+        let mut outliers = effect("measurement_outliers", 1, 0.0);
+        outliers.lambda = None;
+        let mut truths = truths();
+        truths.push(case(vec![outliers]));
+        let whole: Vec<Verdict> = truths
+            .iter()
+            .enumerate()
+            .map(|(index, truth)| {
+                let mut verdict = oracle(truth, &[]);
+                // Outliers close nothing.
+                let explained_rms_m = if index == 6 { 5e-5 } else { 4e-5 };
+                verdict.gap = Some(Gap { geometry_rms_m: 5e-5, explained_rms_m, noise_rms_m: Some(3.5e-5) });
+                verdict
+            })
+            .collect();
+        let mut without: Vec<Verdict> = truths.iter().map(|truth| oracle(truth, &withheld)).collect();
+        without[1].gap = Some(Gap { geometry_rms_m: 5e-5, explained_rms_m: 4.5e-5, noise_rms_m: None });
+        let restorable: Vec<bool> = truths.iter().map(|truth| restorable(truth, &withheld)).collect();
+        assert_eq!(restorable, [false, true, true, false, false, false, true]);
+        let told: Vec<Option<Gap>> =
+            whole.iter().zip(restorable).map(|(verdict, is)| if is { verdict.gap } else { None }).collect();
+        let rows = restored(&truths, [&without, &whole], &told, &withheld);
+        let cases: Vec<(&str, &str, usize)> =
+            rows.iter().map(|row| (row.kind.as_str(), row.lambda.as_str(), row.cases)).filter(|row| row.2 > 0).collect();
+        let expected = [
+            (ANY, "λ < 60", 2),
+            (ANY, "no λ", 1),
+            (ANY, "all", 3),
+            ("backlash", "λ < 60", 2),
+            ("backlash", "all", 2),
+            ("measurement_outliers", "no λ", 1),
+            ("measurement_outliers", "all", 1),
+            (NOT_THERE, "all", 4),
+        ];
+        assert_eq!(cases, expected);
+        let (low, none, not_there) = (&rows[0], &rows[2], rows.last().unwrap());
+        assert_eq!((low.right, low.wrong, low.unknown), (Some(2), 0, 0));
+        assert_eq!(low.closure.as_ref().and_then(|closure| closure.median), Some(1.0));
+        let rms = [low.geometry_rms_m, low.withheld_rms_m, low.restored_rms_m, low.noise_rms_m];
+        assert_eq!(rms, [5e-5, 4.5e-5, 4e-5, 3.5e-5].map(Some));
+        // Nothing to close is no share of anything.
+        let closure = none.closure.as_ref().unwrap();
+        assert_eq!((none.right, closure.cases, closure.nothing_to_close, closure.mean), (Some(1), 0, 1, None));
+        assert_eq!((not_there.right, not_there.wrong, not_there.closure.clone()), (None, 0, None));
+
+        // Found elsewhere is not found, and is wrong.
+        let mut elsewhere = whole.clone();
+        elsewhere[1].effects[0].location.index = Some(7);
+        let rows = restored(&truths, [&without, &elsewhere], &told, &withheld);
+        assert_eq!((rows[0].right, rows[0].wrong), (Some(1), 1));
     }
 
     #[test]

@@ -31,6 +31,9 @@ pub struct Gap {
     pub geometry_rms_m: f64,
     /// Geometry and effects.
     pub explained_rms_m: f64,
+    /// What noise alone would leave.
+    #[serde(default)]
+    pub noise_rms_m: Option<f64>,
 }
 
 /// An effect that is named.
