@@ -3,7 +3,7 @@
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::evidence::{SCALES, fit, one_signed};
-use super::held_out::HeldOut;
+use super::held_out::{Block, Fold, HeldOut};
 use super::outcome::{
     Blocked, Candidate, Diagnosis, Effect, Gap, LeftOut, Magnitude, MinimumDetectable, NoiseFloor, NoiseSource, Parameters,
     Place, Residual, Undetectable, Unknown, Verdict,
@@ -36,7 +36,7 @@ fn blocked(held_out: &HeldOut) -> Option<Blocked> {
         folds: held_out.folds.len(),
         nominal_rms_m: rms(held_out.folds.iter().map(|fold| fold.nominal).sum()),
         geometry_rms_m: rms(held_out.folds.iter().map(|fold| fold.geometry).sum()),
-        explained_rms_m: rms(held_out.folds.iter().map(|fold| *fold.explained.last().unwrap_or(&fold.geometry)).sum()),
+        explained_rms_m: rms(held_out.folds.iter().map(Fold::all).sum()),
         left_out: held_out
             .folds
             .iter()
@@ -46,10 +46,27 @@ fn blocked(held_out: &HeldOut) -> Option<Blocked> {
                     name: fold.name.clone(),
                     readings: fold.rows,
                     geometry_rms_m: rms(fold.geometry),
-                    explained_rms_m: rms(*fold.explained.last().unwrap_or(&fold.geometry)),
+                    explained_rms_m: rms(fold.all()),
                 }
             })
             .collect(),
+    })
+}
+
+/// How many folds do without something that evidence chose for them.
+fn doing_without(held_out: &HeldOut) -> Option<String> {
+    let what = match held_out.by {
+        Block::Region => "regions",
+        Block::Payload => "payloads",
+        Block::Session => "sessions",
+    };
+    let count = held_out.folds.iter().filter(|fold| fold.does_without()).count();
+    (count > 0).then(|| {
+        format!(
+            "{count} of {} folds ({what}) leave out effects that evidence chose for them, because these did not help on readings that \
+             were not used",
+            held_out.folds.len()
+        )
     })
 }
 
@@ -190,6 +207,7 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
              them to n / (1 + {correlation:.2} (n − 1))"
         ));
     }
+    notes.extend(analysis.held_out.iter().filter_map(doing_without));
     let noise_rms = libm::sqrt(3.0) * position_m;
 
     // Held out.
@@ -197,33 +215,22 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
     let rms = |squares: f64| libm::sqrt(squares / rows);
     let nominal_rms_m = rms(folds.iter().map(|fold| fold.nominal).sum());
     let geometry_rms_m = rms(folds.iter().map(|fold| fold.geometry).sum());
-    let after = |count: usize| {
-        rms(folds
-            .iter()
-            .map(|fold| {
-                if count == 0 {
-                    fold.geometry
-                } else {
-                    *fold.explained.get(count - 1).or(fold.explained.last()).unwrap_or(&fold.geometry)
-                }
-            })
-            .sum())
-    };
+    let after = |count: usize| rms(folds.iter().map(|fold| fold.with(count)).sum());
     let explained_rms_m = after(usize::MAX);
     let floor2 = noise_rms * noise_rms;
     let closed = |before: f64, after: f64| {
         let gap = before * before - floor2;
         (gap > 0.02 * floor2 && gap > 0.0).then(|| 1.0 - (after * after - floor2) / gap)
     };
-    // Where nothing was chosen nothing is closed.
-    let chosen_any = folds.iter().any(|fold| !fold.chosen.is_empty());
-    let gap_closed = closed(geometry_rms_m, explained_rms_m).filter(|_| chosen_any);
+    // Where nothing is used nothing is closed.
+    let uses_any = folds.iter().any(|fold| !fold.explained.is_empty());
+    let gap_closed = closed(geometry_rms_m, explained_rms_m).filter(|_| uses_any);
     let gap_closed_ci95 = gap_closed.and_then(|_| {
         let of_folds: Vec<f64> = folds
             .iter()
             .filter_map(|fold| {
                 let mean = |squares: f64| libm::sqrt(squares / fold.rows as f64);
-                closed(mean(fold.geometry), mean(*fold.explained.last().unwrap_or(&fold.geometry)))
+                closed(mean(fold.geometry), mean(fold.all()))
             })
             .collect();
         let n = of_folds.len() as f64;
