@@ -4,12 +4,20 @@
 //! Everything is linear about the fitted geometry, so that inner products ([`gram`]) suffice for evidence ([`evidence`]), search
 //! ([`search`]) and cross-validation ([`held_out`]).
 
+mod advice;
+mod claims;
 pub mod conditions;
+mod confusion;
+mod detectability;
 pub mod evidence;
+mod gap;
 pub mod gram;
 pub mod groups;
 pub mod held_out;
+mod magnitude;
 pub mod mistake;
+mod naming;
+mod notes;
 pub mod open_set;
 pub mod outcome;
 pub mod outliers;
@@ -17,8 +25,10 @@ mod parameters;
 pub mod power;
 pub mod rows;
 pub mod search;
+mod sentence;
 #[cfg(test)]
 pub(crate) mod tests;
+mod unknown;
 mod verdict;
 pub mod waterfall;
 mod weights;
