@@ -239,38 +239,9 @@ impl Singles {
     /// not multiplied with those of other hypotheses, which only sets of effects need.
     #[must_use]
     pub fn evidence(&self) -> Vec<evidence::Model> {
-        let geometry = self.problem.geometry;
-        let last = self.whitened.ncols() - 1 - geometry;
-        let (jacobian, rest) = (self.whitened.columns(0, geometry), self.whitened.columns(geometry, last + 1));
-        let transposed = jacobian.transpose();
-        let mut mixed = &transposed * rest;
-        for column in 0..geometry {
-            mixed[(column, last)] -= self.problem.offset[column];
-        }
-        let mut normal = &transposed * jacobian;
-        for column in 0..geometry {
-            normal[(column, column)] += 1.0;
-        }
-        let Some(cholesky) = normal.cholesky() else {
+        let blocks = (0..self.candidates.hypotheses.len()).map(|hypothesis| self.candidates.columns(hypothesis));
+        let Some(surviving) = Surviving::of_blocks(&self.whitened, self.problem.geometry, &self.problem.offset, blocks) else {
             return Vec::new();
-        };
-        let absorbed = cholesky.solve(&mixed);
-        let product = |a: usize, b: usize| rest.column(a).dot(&rest.column(b)) - mixed.column(a).dot(&absorbed.column(b));
-        let mut products = DMatrix::zeros(last, last);
-        for hypothesis in 0..self.candidates.hypotheses.len() {
-            for a in self.candidates.columns(hypothesis) {
-                for b in self.candidates.columns(hypothesis) {
-                    products[(a, b)] = product(a, b);
-                }
-            }
-        }
-        let pinned: f64 = cholesky.inverse().diagonal().sum();
-        let surviving = Surviving {
-            products,
-            with_residual: DVector::from_fn(last, |column, _| product(column, last)),
-            residual: (product(last, last) + self.problem.offset.norm_squared()).max(1e-12),
-            freedom: (self.whitened.nrows() as f64 - (geometry as f64 - pinned)).max(1.0),
-            absorbed,
         };
         let mut candidates = self.candidates.clone();
         weigh(&mut candidates, &surviving);
