@@ -1,4 +1,9 @@
 //! Nested cross-validation: effects are chosen again without each fold, and the fold shows what they are worth.
+//!
+//! Evidence is as good as its model of what is left. Where that is far from it (a camera whose errors no effect of the library has), what
+//! evidence chooses may predict worse than geometry alone. So a fold uses what was chosen for it as far as such choices helped the other
+//! folds when those were left out. Its own readings were among those that the others' choices were made from; how well they are
+//! predicted does not count.
 
 use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector, Vector3};
 use serde::{Deserialize, Serialize};
@@ -84,12 +89,35 @@ pub struct Fold {
     pub nominal: f64,
     /// With all geometry.
     pub geometry: f64,
-    /// With all geometry and the first 1, 2, … effects chosen without the fold; the last stands for more.
+    /// With all geometry and the first 1, 2, … effects chosen without the fold, as many as are used; the last stands for more.
     pub explained: Vec<f64>,
-    /// What was chosen, in the order added.
+    /// What evidence chose, in the order added, whether it is used or not.
     pub chosen: Vec<usize>,
     /// Sets of hypotheses with their probabilities.
     pub models: Vec<(Vec<(usize, usize)>, f64)>,
+}
+
+impl Fold {
+    /// With the first `count` effects of those that are used.
+    #[must_use]
+    pub fn with(&self, count: usize) -> f64 {
+        match self.explained.len().min(count) {
+            0 => self.geometry,
+            count => self.explained[count - 1],
+        }
+    }
+
+    /// With all that is used.
+    #[must_use]
+    pub fn all(&self) -> f64 {
+        self.with(usize::MAX)
+    }
+
+    /// Whether something that evidence chose is not used.
+    #[must_use]
+    pub fn does_without(&self) -> bool {
+        self.explained.len() < self.chosen.len()
+    }
 }
 
 /// What leaving out in one way says.
@@ -223,7 +251,7 @@ pub fn cross_validate(
 ) -> HeldOut {
     use rayon::prelude::*;
     let total = sum(grams);
-    let folds = (0..grams.len())
+    let mut folds: Vec<Fold> = (0..grams.len())
         .into_par_iter()
         .filter(|number| scheme.leaves_enough(*number))
         .filter_map(|number| {
@@ -232,7 +260,30 @@ pub fn cross_validate(
             Some(Fold { name: scheme.names[number].clone(), ..fold })
         })
         .collect();
+    let used: Vec<usize> = (0..folds.len()).map(|number| used(&folds, number)).collect();
+    for (fold, used) in folds.iter_mut().zip(used) {
+        fold.explained.truncate(used);
+    }
     HeldOut { by: scheme.by, folds }
+}
+
+/// How many of the effects chosen for fold `number` are used, by what as many of theirs did to the other folds: the most with which
+/// those were predicted no worse than by geometry alone, or by no more than one standard error, for evidence has the benefit of the
+/// doubt. All of them where fewer than two other folds can tell. Folds are compared, not readings: those of a region err alike.
+pub(super) fn used(folds: &[Fold], number: usize) -> usize {
+    let chosen = folds[number].explained.len();
+    let others = || folds.iter().enumerate().filter(|(other, _)| *other != number).map(|(_, fold)| fold);
+    let count = others().count() as f64;
+    if count < 2.0 {
+        return chosen;
+    }
+    let no_worse = |effects: &usize| {
+        let worse: Vec<f64> = others().map(|fold| fold.with(*effects) - fold.geometry).collect();
+        let mean = worse.iter().sum::<f64>() / count;
+        let scatter: f64 = worse.iter().map(|worse| (worse - mean) * (worse - mean)).sum();
+        mean <= libm::sqrt(scatter / (count * (count - 1.0)))
+    };
+    (1..=chosen).rev().find(no_worse).unwrap_or(0)
 }
 
 /// The sum of all blocks.

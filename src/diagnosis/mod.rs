@@ -4,12 +4,21 @@
 //! Everything is linear about the fitted geometry, so that inner products ([`gram`]) suffice for evidence ([`evidence`]), search
 //! ([`search`]) and cross-validation ([`held_out`]).
 
+mod advice;
+mod candidates;
+mod claims;
 pub mod conditions;
+mod confusion;
+mod detectability;
 pub mod evidence;
+mod gap;
 pub mod gram;
 pub mod groups;
 pub mod held_out;
+mod magnitude;
 pub mod mistake;
+mod naming;
+mod notes;
 pub mod open_set;
 pub mod outcome;
 pub mod outliers;
@@ -18,21 +27,22 @@ pub mod power;
 mod ripple;
 pub mod rows;
 pub mod search;
+mod sentence;
 #[cfg(test)]
 pub(crate) mod tests;
+mod unknown;
 mod verdict;
 pub mod waterfall;
 mod weights;
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::Arm;
-use crate::effects::signature::library::{Hypothesis, RIPPLES, library, ripple};
-use crate::effects::signature::shape::{Displacement, Shape};
+use crate::effects::signature::library::{Hypothesis, library, ripple};
+use crate::effects::signature::shape::Displacement;
 use crate::effects::{Kind, Location};
 use crate::measurement::{Measurement, Sensor};
+use candidates::{matrix, weigh};
 use conditions::Conditions;
 use evidence::{Candidates, NoisePrior};
 use gram::Surviving;
@@ -44,14 +54,8 @@ use rows::{DiagnosisError, Readings, Rows};
 
 /// Folds of the cross-validation.
 pub const FOLDS: usize = 5;
-/// Prior odds of one effect more.
-const ODDS: f64 = 1.0;
 /// Rounds of fitting around what was found.
 const PASSES: usize = 5;
-/// Share of the prior of shapes without a name.
-const NAMELESS: f64 = 0.25;
-/// λ at the upper end of the realistic range below which a hypothesis has no information in the data.
-const NO_INFORMATION: f64 = 4.0;
 
 /// How to diagnose.
 #[derive(Clone, Debug, PartialEq)]
@@ -241,38 +245,9 @@ impl Singles {
     /// not multiplied with those of other hypotheses, which only sets of effects need.
     #[must_use]
     pub fn evidence(&self) -> Vec<evidence::Model> {
-        let geometry = self.problem.geometry;
-        let last = self.whitened.ncols() - 1 - geometry;
-        let (jacobian, rest) = (self.whitened.columns(0, geometry), self.whitened.columns(geometry, last + 1));
-        let transposed = jacobian.transpose();
-        let mut mixed = &transposed * rest;
-        for column in 0..geometry {
-            mixed[(column, last)] -= self.problem.offset[column];
-        }
-        let mut normal = &transposed * jacobian;
-        for column in 0..geometry {
-            normal[(column, column)] += 1.0;
-        }
-        let Some(cholesky) = normal.cholesky() else {
+        let blocks = (0..self.candidates.hypotheses.len()).map(|hypothesis| self.candidates.columns(hypothesis));
+        let Some(surviving) = Surviving::of_blocks(&self.whitened, self.problem.geometry, &self.problem.offset, blocks) else {
             return Vec::new();
-        };
-        let absorbed = cholesky.solve(&mixed);
-        let product = |a: usize, b: usize| rest.column(a).dot(&rest.column(b)) - mixed.column(a).dot(&absorbed.column(b));
-        let mut products = DMatrix::zeros(last, last);
-        for hypothesis in 0..self.candidates.hypotheses.len() {
-            for a in self.candidates.columns(hypothesis) {
-                for b in self.candidates.columns(hypothesis) {
-                    products[(a, b)] = product(a, b);
-                }
-            }
-        }
-        let pinned: f64 = cholesky.inverse().diagonal().sum();
-        let surviving = Surviving {
-            products,
-            with_residual: DVector::from_fn(last, |column, _| product(column, last)),
-            residual: (product(last, last) + self.problem.offset.norm_squared()).max(1e-12),
-            freedom: (self.whitened.nrows() as f64 - (geometry as f64 - pinned)).max(1.0),
-            absorbed,
         };
         let mut candidates = self.candidates.clone();
         weigh(&mut candidates, &surviving);
@@ -355,93 +330,4 @@ fn put_back(raw: &mut DMatrix<f64>, rows: &Rows, displacement: &[Displacement]) 
 fn mean_sigma(sensor: &Sensor, measurements: &[&Measurement]) -> f64 {
     let sum: f64 = measurements.iter().map(|row| sensor.position_sigma_at(&row.position().coords)).sum();
     (sum / measurements.len().max(1) as f64).max(1e-9)
-}
-
-/// `[geometry | signatures | residual]`, m and rad, and the hypotheses that its columns stand for.
-fn matrix(rows: &Rows, conditions: &Conditions, hypotheses: Vec<Hypothesis>) -> (DMatrix<f64>, Candidates) {
-    let geometry = rows.jacobian.ncols();
-    let mut first = Vec::new();
-    let mut columns = 0;
-    for hypothesis in &hypotheses {
-        first.push(columns);
-        columns += hypothesis.spread.len();
-    }
-    let mut raw = DMatrix::zeros(rows.residual.len(), geometry + columns + 1);
-    raw.columns_mut(0, geometry).copy_from(&rows.jacobian);
-    raw.set_column(geometry + columns, &rows.residual);
-    let unit: Vec<f64> = hypotheses.iter().map(|hypothesis| libm::sqrt(hypothesis.range[0] * hypothesis.range[1])).collect();
-    let attitude = rows.per_row == 6;
-    for (row, reading) in conditions.readings.iter().enumerate() {
-        for (number, hypothesis) in hypotheses.iter().enumerate() {
-            for (at, column) in hypothesis.shape.columns(reading, attitude).iter().enumerate() {
-                let factor = unit[number] * hypothesis.spread[at];
-                for equation in 0..rows.per_row {
-                    raw[(row * rows.per_row + equation, geometry + first[number] + at)] = column[equation] * factor;
-                }
-            }
-        }
-    }
-    let count = hypotheses.len();
-    (raw, Candidates { hypotheses, first, unit, log_odds: vec![0.0; count], active: vec![true; count] })
-}
-
-/// A class of hypotheses that share one prior.
-fn class(hypothesis: &Hypothesis) -> (Option<Kind>, u8) {
-    let shape = match hypothesis.shape {
-        _ if hypothesis.kind.is_some() => 0,
-        Shape::Harmonic(_, order) if order >= f64::from(*RIPPLES.start()) => 17,
-        Shape::Harmonic(..) => 1,
-        Shape::Bump { .. } => 2,
-        Shape::Crosstalk { .. } => 3,
-        Shape::Softening(_) | Shape::Hardening(_) => 4,
-        Shape::TorqueMemory(..) => 5,
-        Shape::DirectionLoad(_) => 6,
-        Shape::Memory(..) => 7,
-        Shape::AllYield => 8,
-        Shape::AngleCurve(_) => 10,
-        Shape::AngleMap { .. } => 11,
-        Shape::UnequalBend(_) => 12,
-        Shape::UnequalSeat(_) => 13,
-        Shape::RootAcross(_) => 14,
-        Shape::UnequalShift(_) => 15,
-        Shape::BaseCourse(_) => 16,
-        Shape::ToolCourse(_) => 18,
-        _ => 9,
-    };
-    (hypothesis.kind, shape)
-}
-
-/// Which hypotheses have information, and their prior odds: equal for all kinds, for all places of a kind, for all variants at a
-/// place; shapes without a name share a part.
-fn weigh(candidates: &mut Candidates, surviving: &Surviving) {
-    let count = candidates.hypotheses.len();
-    for number in 0..count {
-        let information: f64 = candidates.columns(number).map(|column| surviving.products[(column, column)]).sum();
-        let largest = candidates.hypotheses[number].range[1] / candidates.unit[number];
-        candidates.active[number] = information * largest * largest >= NO_INFORMATION;
-    }
-    let active: Vec<usize> = (0..count).filter(|number| candidates.active[*number]).collect();
-    let hypotheses = &candidates.hypotheses;
-    let mut classes: [BTreeSet<(Option<Kind>, u8)>; 2] = Default::default();
-    let mut places: BTreeMap<(Option<Kind>, u8), BTreeMap<Option<usize>, usize>> = BTreeMap::new();
-    let joints = hypotheses.iter().filter_map(|hypothesis| hypothesis.location.index).max().unwrap_or(1);
-    for number in &active {
-        let class = class(&hypotheses[*number]);
-        classes[usize::from(class.0.is_some())].insert(class);
-        *places.entry(class).or_default().entry(hypotheses[*number].location.index).or_default() += 1;
-    }
-    let mut log_odds = vec![f64::NEG_INFINITY; count];
-    for number in &active {
-        let class = class(&hypotheses[*number]);
-        let of_class = &places[&class];
-        let variants = of_class[&hypotheses[*number].location.index] as f64;
-        let named = class.0.is_some();
-        let share = if named { 1.0 - NAMELESS } else { NAMELESS };
-        let count = classes[usize::from(named)].len() as f64;
-        let own = hypotheses[*number].share.unwrap_or(1.0 / variants);
-        // A scan went over all joints, whatever it found.
-        let of_class = if hypotheses[*number].share.is_some() && !named { joints } else { of_class.len() };
-        log_odds[*number] = libm::log(ODDS * share * own / (count * of_class as f64));
-    }
-    candidates.log_odds = log_odds;
 }

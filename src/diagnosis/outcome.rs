@@ -102,7 +102,7 @@ pub struct Gap {
     pub nominal_rms_m: f64,
     /// All geometry fitted.
     pub geometry_rms_m: f64,
-    /// Geometry and what each fold chose.
+    /// Geometry and what each fold uses of what was chosen for it.
     pub explained_rms_m: f64,
     /// Noise floor in 3-D.
     pub noise_rms_m: f64,
@@ -127,7 +127,7 @@ pub struct Blocked {
     pub nominal_rms_m: f64,
     /// All geometry fitted.
     pub geometry_rms_m: f64,
-    /// Geometry and what each fold chose.
+    /// Geometry and what each fold uses of what was chosen for it.
     pub explained_rms_m: f64,
     /// Fold by fold.
     pub left_out: Vec<LeftOut>,
@@ -142,7 +142,7 @@ pub struct LeftOut {
     pub readings: usize,
     /// 3-D position RMS with geometry from the rest, m.
     pub geometry_rms_m: f64,
-    /// With geometry and what the rest chose, m.
+    /// With geometry and what is used of what the rest chose, m.
     pub explained_rms_m: f64,
 }
 

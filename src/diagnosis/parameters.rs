@@ -1,18 +1,13 @@
 //! What a named effect has besides kind, place and magnitude: enough to make it happen in a simulation.
 
 use super::Analysis;
-use super::evidence::{SCALES, fit};
+use super::evidence::Fit;
 use super::outcome::Parameters;
 use crate::effects::Kind;
 use crate::effects::signature::shape::Shape;
 
 /// Of a member of the best set, from the fit that tells its magnitude.
-pub(super) fn parameters(analysis: &Analysis<'_>, hypothesis: usize) -> Parameters {
-    let widest = SCALES.len() - 1;
-    let members: Vec<(usize, usize)> = analysis.found.best.members.iter().map(|(member, _)| (*member, widest)).collect();
-    let Some(fit) = fit(analysis.surviving, analysis.candidates, analysis.noise, &members) else {
-        return Parameters::default();
-    };
+pub(super) fn parameters(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -> Parameters {
     let of = &analysis.candidates.hypotheses[hypothesis];
     let unit = analysis.candidates.unit[hypothesis];
     let values: Vec<f64> = (analysis.candidates.columns(hypothesis).zip(&of.spread))

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, Vector3};
 use serde_json::Value;
 
 use super::gram::Gram;
+use super::held_out::{Fold, used};
 use super::outcome::{Diagnosis, NoiseSource, Verdict};
 use super::{Options, diagnose};
 use crate::arm::Arm;
@@ -301,6 +302,37 @@ fn sessions_with_bases_of_their_own_are_no_step() {
     rows.iter_mut().for_each(|row| row.session = Some(if row.index >= 25 { "b" } else { "a" }.to_owned()));
     let found = diagnosed(&arm, &rows, Vec::new());
     assert!(found.notes.iter().any(|note| note.contains("share one base")), "{:?}", found.notes);
+}
+
+#[test]
+fn a_fold_uses_what_helped_the_others() {
+    // Squares with geometry alone, and with one effect and two.
+    let fold = |[geometry, one, two]: [f64; 3]| Fold {
+        name: String::new(),
+        rows: 10,
+        nominal: 100.0,
+        geometry,
+        explained: vec![one, two],
+        chosen: vec![3, 5],
+        models: Vec::new(),
+    };
+    let with = |squares: &[[f64; 3]]| -> Vec<usize> {
+        let folds: Vec<Fold> = squares.iter().map(|squares| fold(*squares)).collect();
+        (0..folds.len()).map(|number| used(&folds, number)).collect()
+    };
+    // Both help everywhere.
+    assert_eq!(with(&[[9.0, 5.0, 4.0], [8.0, 4.0, 3.0], [9.0, 6.0, 5.0], [7.0, 4.0, 2.0]]), [2; 4]);
+    // The second makes worse what geometry leaves; so do both.
+    assert_eq!(with(&[[9.0, 8.0, 12.0], [8.0, 7.5, 11.0], [9.0, 9.0, 13.0], [7.0, 6.0, 9.5]]), [1; 4]);
+    assert_eq!(with(&[[9.0, 10.0, 12.0], [8.0, 9.5, 11.0], [9.0, 11.0, 13.0], [7.0, 9.0, 9.5]]), [0; 4]);
+    // Worse in one fold and better in the others is chance; to the fold itself its own loss says nothing.
+    assert_eq!(with(&[[9.0, 8.0, 7.0], [8.0, 7.0, 6.0], [9.0, 8.0, 16.0], [7.0, 6.0, 6.0]]), [2; 4]);
+    // Two folds cannot tell.
+    assert_eq!(with(&[[9.0, 10.0, 12.0], [8.0, 9.5, 11.0]]), [2; 2]);
+    let mut left_out = fold([9.0, 10.0, 12.0]);
+    assert!(!left_out.does_without() && left_out.all() == 12.0 && left_out.with(1) == 10.0);
+    left_out.explained.clear();
+    assert!(left_out.does_without() && left_out.all() == 9.0);
 }
 
 #[test]

@@ -81,7 +81,7 @@ pub(crate) fn steps(diagnosis: &Diagnosis) -> Vec<Step> {
             steps.push(Step { name, rms_m: effect.held_out_rms_after_m, effect: Some(number) });
         }
     }
-    steps.push(step("all that each fold chose", gap.explained_rms_m));
+    steps.push(step("all that each fold uses", gap.explained_rms_m));
     steps.push(step(&format!("noise floor ({source})"), gap.noise_rms_m));
     steps
 }

@@ -117,7 +117,7 @@ fn for_people_it_is_text_on_stdout_and_quiet_is_quiet() {
         "Substitute for the lost Table 1",
         "held out (50), identified",
         "Identifiable: 36 of 45",
-        "all that each fold chose",
+        "all that each fold uses",
         "arm8.calibrated.urdf",
     ] {
         assert!(ran.stdout.contains(expected), "{expected}: {}", ran.stdout);

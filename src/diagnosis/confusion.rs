@@ -1,0 +1,79 @@
+//! What the data cannot tell apart.
+
+use super::Analysis;
+use super::claims::{Claim, NAMED, SURE, claim, kind_name, place, rivals};
+use super::outcome::Candidate;
+
+/// A hypothesis of a set has at least this probability.
+const WORTH_SAYING: f64 = 0.03;
+
+/// Sets of claims that the data cannot tell apart: each member of the best set that is not sure, with what may stand in its place.
+pub(super) fn confusion(analysis: &Analysis<'_>) -> Vec<Vec<Candidate>> {
+    // All claims with their probabilities and one hypothesis that stands for each.
+    let mut claims: Vec<(Claim, f64, usize)> = Vec::new();
+    for (members, weight) in &analysis.found.models {
+        let mut seen: Vec<Claim> = Vec::new();
+        for (hypothesis, _) in members {
+            let this = claim(analysis, *hypothesis);
+            if seen.contains(&this) {
+                continue;
+            }
+            seen.push(this);
+            match claims.iter_mut().find(|(known, _, _)| *known == this) {
+                Some((_, probability, _)) => *probability += weight,
+                None => claims.push((this, *weight, *hypothesis)),
+            }
+        }
+    }
+    // Parts of the data that contradict the best set take their share of its members' probabilities.
+    for (member, _) in &analysis.found.best.members {
+        let this = claim(analysis, *member);
+        let Some(before) = claims.iter().find(|(known, _, _)| *known == this).map(|(_, probability, _)| *probability) else {
+            continue;
+        };
+        for (rival, hypothesis, share) in rivals(analysis, this) {
+            let moved = before * share;
+            for (known, probability, _) in &mut claims {
+                *probability -= if *known == this { moved } else { 0.0 };
+            }
+            match claims.iter_mut().find(|(known, _, _)| *known == rival) {
+                Some((_, probability, _)) => *probability = (*probability + moved).min(1.0),
+                None => claims.push((rival, moved, hypothesis)),
+            }
+        }
+    }
+    claims.retain(|(_, probability, _)| *probability >= WORTH_SAYING && *probability < SURE);
+    // Claims of one set exclude each other: they are hardly ever in one model.
+    let together = |a: &Claim, b: &Claim| -> f64 {
+        let has =
+            |members: &[(usize, usize)], one: &Claim| members.iter().any(|(hypothesis, _)| claim(analysis, *hypothesis) == *one);
+        let models = analysis.found.models.iter();
+        models.filter(|(members, _)| has(members, a) && has(members, b)).map(|(_, weight)| weight).sum()
+    };
+    claims.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut sets: Vec<Vec<(Claim, f64, usize)>> = Vec::new();
+    for one in claims {
+        let fits = |set: &Vec<(Claim, f64, usize)>| {
+            let sum: f64 = set.iter().map(|(_, probability, _)| probability).sum();
+            sum + one.1 < 1.02 && set.iter().all(|other| together(&other.0, &one.0) < 0.3 * one.1.min(other.1))
+        };
+        match sets.iter_mut().find(|set| fits(set)) {
+            Some(set) => set.push(one),
+            None => sets.push(vec![one]),
+        }
+    }
+    sets.into_iter()
+        .filter(|set| set.len() > 1 && set.iter().map(|(_, probability, _)| probability).sum::<f64>() >= NAMED)
+        .map(|set| {
+            set.into_iter()
+                .take(12)
+                .map(|((kind, _), probability, hypothesis)| Candidate {
+                    kind: kind_name(kind),
+                    location: place(analysis, hypothesis),
+                    probability,
+                    detail: analysis.candidates.hypotheses[hypothesis].detail.clone(),
+                })
+                .collect()
+        })
+        .collect()
+}

@@ -1,0 +1,100 @@
+//! What these readings could have shown: the smallest magnitude of each kind at each place.
+
+use super::Analysis;
+use super::claims::{Claim, claim, kind_name, place};
+use super::outcome::{MinimumDetectable, Place, Undetectable};
+use super::power::Bench;
+use super::sentence::words;
+use crate::effects::Kind;
+
+/// What would show and what would not.
+pub(super) struct Detectability {
+    /// What would not show at a realistic magnitude.
+    pub(super) undetectable: Vec<Undetectable>,
+    /// What would, from which magnitude on.
+    pub(super) detectable: Vec<Undetectable>,
+    /// Share of kinds and places that would.
+    pub(super) share: f64,
+}
+
+/// Of all kinds and places. `noise`: mean square over the declared one.
+pub(super) fn detectability(analysis: &Analysis<'_>, noise: f64) -> Detectability {
+    use rayon::prelude::*;
+    let candidates = analysis.candidates;
+    let mut claims: Vec<(Kind, Claim, Vec<usize>)> = Vec::new();
+    for number in 0..candidates.hypotheses.len() {
+        let this = claim(analysis, number);
+        match (claims.iter_mut().find(|(_, known, _)| *known == this), this.0) {
+            (Some((_, _, variants)), _) => variants.push(number),
+            (None, Some(kind)) => claims.push((kind, this, vec![number])),
+            (None, None) => {}
+        }
+    }
+    let bench = Bench::new(candidates, analysis.surviving, analysis.noise, noise, &analysis.found.best.members);
+    let powers: Vec<_> = claims.par_iter().map(|(_, _, variants)| bench.power(variants)).collect();
+    let (mut undetectable, mut detectable) = (Vec::new(), Vec::new());
+    let (mut seen, mut all) = (0.0, 0.0);
+    for ((kind, _, variants), power) in claims.into_iter().zip(powers) {
+        let hypothesis = &candidates.hypotheses[variants[0]];
+        let place = Place { time_s: None, ..place(analysis, variants[0]) };
+        let largest = hypothesis.range[1];
+        all += 1.0;
+        let value = power.least.filter(|least| least.is_finite() && *least < 1e4 * largest);
+        let least = MinimumDetectable { value, unit: kind.unit().to_owned() };
+        let entry = |reason: String| Undetectable {
+            kind: kind.name().to_owned(),
+            location: place,
+            minimum_detectable: least.clone(),
+            reason,
+        };
+        match value {
+            Some(value) if value <= largest => {
+                seen += 1.0;
+                detectable.push(entry(String::new()));
+            }
+            Some(_) => {
+                let alike = power.alike.filter(|(_, likeness)| *likeness > 0.8).map(|(other, likeness)| {
+                    let that = &candidates.hypotheses[other];
+                    let words = words(&kind_name(that.kind), &that.location);
+                    format!("cannot be told from {words} (likeness {:.2}) at a realistic size", libm::sqrt(likeness))
+                });
+                let reason = alike.unwrap_or_else(|| "a realistic size is lost in the noise, or geometry absorbs it".to_owned());
+                undetectable.push(entry(reason));
+            }
+            None => undetectable.push(entry(why_nothing(kind).to_owned())),
+        }
+    }
+    let columns = &analysis.conditions.columns;
+    let joints = analysis.rows.mechanism.joint_count();
+    let mut missing = |kind: Kind, reason: &str| {
+        for joint in 1..=joints {
+            all += 1.0;
+            undetectable.push(Undetectable {
+                kind: kind.name().to_owned(),
+                location: Place { level: kind.level(), index: Some(joint), time_s: None },
+                minimum_detectable: MinimumDetectable { value: None, unit: kind.unit().to_owned() },
+                reason: reason.to_owned(),
+            });
+        }
+    };
+    if !columns.approach {
+        missing(Kind::Backlash, "no approach directions were recorded");
+    }
+    if !columns.temperature {
+        for kind in [Kind::LinkThermalGrowth, Kind::JointThermalDrift] {
+            missing(kind, "no temperatures that change were recorded");
+        }
+    }
+    Detectability { undetectable, detectable, share: seen / f64::max(all, 1.0) }
+}
+
+fn why_nothing(kind: Kind) -> &'static str {
+    match kind {
+        Kind::MeasurementScale => "link lengths that are fitted absorb it wholly; a scale bar would show it",
+        Kind::JointCompliance | Kind::GravityLostMotion | Kind::TiltClearance | Kind::RadialClearance | Kind::LinkBending => {
+            "gravity loads this joint not at all, or always alike"
+        }
+        Kind::Backlash => "the joint is always approached from the same side",
+        _ => "geometry absorbs it wholly on these configurations",
+    }
+}

@@ -1,0 +1,109 @@
+//! Held-out errors: the gap between geometry and noise, and what the effects close of it.
+
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::Analysis;
+use super::held_out::{Fold, HeldOut};
+use super::outcome::{Blocked, Gap, LeftOut};
+
+/// The folds by region, and the noise that no model goes below.
+pub(super) struct Closing<'a> {
+    /// By region.
+    pub(super) folds: &'a [Fold],
+    /// 3-D RMS of the noise, m.
+    noise_rms_m: f64,
+    /// In other ways.
+    others: &'a [HeldOut],
+}
+
+impl<'a> Closing<'a> {
+    /// `position_m`: noise, one sigma per axis.
+    pub(super) fn new(analysis: &'a Analysis<'_>, position_m: f64) -> Closing<'a> {
+        let (folds, others) = match analysis.held_out.split_first() {
+            Some((by_region, others)) => (by_region.folds.as_slice(), others),
+            None => (&[][..], &[][..]),
+        };
+        Closing { folds, noise_rms_m: libm::sqrt(3.0) * position_m, others }
+    }
+
+    /// Of a sum over the readings of all folds.
+    fn rms(&self, squares: f64) -> f64 {
+        let rows: f64 = self.folds.iter().map(|fold| fold.rows as f64).sum::<f64>().max(1.0);
+        libm::sqrt(squares / rows)
+    }
+
+    /// Held-out RMS with the first `count` effects that each fold uses, m.
+    pub(super) fn after(&self, count: usize) -> f64 {
+        self.rms(self.folds.iter().map(|fold| fold.with(count)).sum())
+    }
+
+    /// Share of the gap that a step from one RMS to another closes.
+    pub(super) fn closed(&self, before: f64, after: f64) -> Option<f64> {
+        let floor2 = self.noise_rms_m * self.noise_rms_m;
+        let gap = before * before - floor2;
+        (gap > 0.02 * floor2 && gap > 0.0).then(|| 1.0 - (after * after - floor2) / gap)
+    }
+
+    /// 95 % interval of the share closed, from the folds.
+    fn interval(&self) -> Option<[f64; 2]> {
+        let of_folds: Vec<f64> = self
+            .folds
+            .iter()
+            .filter_map(|fold| {
+                let mean = |squares: f64| libm::sqrt(squares / fold.rows as f64);
+                self.closed(mean(fold.geometry), mean(fold.all()))
+            })
+            .collect();
+        let n = of_folds.len() as f64;
+        let mean = of_folds.iter().sum::<f64>() / n;
+        let variance = of_folds.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / (n - 1.0);
+        let student = StudentsT::new(0.0, 1.0, n - 1.0).ok()?;
+        let half = student.inverse_cdf(0.975) * libm::sqrt(variance / n);
+        (n > 2.0).then_some([mean - half, mean + half])
+    }
+
+    /// All of it.
+    pub(super) fn gap(&self) -> Gap {
+        let geometry_rms_m = self.rms(self.folds.iter().map(|fold| fold.geometry).sum());
+        let explained_rms_m = self.after(usize::MAX);
+        // Where nothing is used nothing is closed.
+        let uses_any = self.folds.iter().any(|fold| !fold.explained.is_empty());
+        let gap_closed = self.closed(geometry_rms_m, explained_rms_m).filter(|_| uses_any);
+        Gap {
+            nominal_rms_m: self.rms(self.folds.iter().map(|fold| fold.nominal).sum()),
+            geometry_rms_m,
+            explained_rms_m,
+            noise_rms_m: self.noise_rms_m,
+            gap_closed,
+            gap_closed_ci95: gap_closed.and_then(|_| self.interval()),
+            folds: self.folds.len(),
+            blocked: self.others.iter().filter_map(blocked).collect(),
+        }
+    }
+}
+
+/// Held-out RMS in one way of leaving out.
+fn blocked(held_out: &HeldOut) -> Option<Blocked> {
+    let rows: usize = held_out.folds.iter().map(|fold| fold.rows).sum();
+    let rms = |squares: f64| libm::sqrt(squares / rows as f64);
+    (rows > 0).then(|| Blocked {
+        by: held_out.by,
+        folds: held_out.folds.len(),
+        nominal_rms_m: rms(held_out.folds.iter().map(|fold| fold.nominal).sum()),
+        geometry_rms_m: rms(held_out.folds.iter().map(|fold| fold.geometry).sum()),
+        explained_rms_m: rms(held_out.folds.iter().map(Fold::all).sum()),
+        left_out: held_out
+            .folds
+            .iter()
+            .map(|fold| {
+                let rms = |squares: f64| libm::sqrt(squares / fold.rows as f64);
+                LeftOut {
+                    name: fold.name.clone(),
+                    readings: fold.rows,
+                    geometry_rms_m: rms(fold.geometry),
+                    explained_rms_m: rms(fold.all()),
+                }
+            })
+            .collect(),
+    })
+}

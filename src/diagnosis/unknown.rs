@@ -1,0 +1,35 @@
+//! Whether something is left that no effect of the library explains.
+
+use super::claims::{NAMED, probability};
+use super::outcome::{NoiseFloor, NoiseSource, Unknown};
+use super::sentence::whose;
+use super::{Analysis, mean_sigma};
+
+/// Of the residual having no structure: below this there is some.
+const STRUCTURED: f64 = 0.003;
+/// Mean square of the residual, over that of the noise that is known, from which on something is left.
+const EXCESS: f64 = 2.4;
+
+/// What is unknown: shapes without a name, structure, or too much. `level`: mean square of the residual over the declared one.
+pub(super) fn unknown(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFloor) -> Unknown {
+    let of_nameless = probability(analysis, |hypothesis| analysis.candidates.hypotheses[hypothesis].kind.is_none());
+    let p_value = analysis.structure.p_value;
+    let structured = p_value < STRUCTURED;
+    // A sensor may be somewhat worse than it says, not this much.
+    let known = !matches!(noise_floor.source, NoiseSource::Assumed);
+    let over = noise_floor.position_m / mean_sigma(analysis.sensor, analysis.measurements);
+    let excess = known && level > EXCESS * over * over;
+    let present = of_nameless >= NAMED || structured || excess;
+    let r#where = present.then(|| {
+        let members = analysis.found.best.members.iter().map(|(hypothesis, _)| &analysis.candidates.hypotheses[*hypothesis]);
+        let mut said: Vec<String> = members.filter(|of| of.kind.is_none()).map(|of| of.detail.clone()).collect();
+        if structured {
+            said.push(analysis.structure.r#where.clone());
+        }
+        if said.is_empty() {
+            said.push(format!("what remains is {:.1} times the {} noise", libm::sqrt(level), whose(noise_floor.source)));
+        }
+        said.join("; ")
+    });
+    Unknown { present, p_value: p_value.min(1.0 - of_nameless).max(0.0), r#where }
+}
