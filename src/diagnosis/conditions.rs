@@ -7,6 +7,9 @@ use crate::effects::signature::library::Columns;
 use crate::effects::signature::shape::{FORGETTING_S, MEMORIES, Reading};
 use crate::measurement::Measurement;
 
+/// A joint is upright where its torque never exceeds so many sigmas of what is not known of it: its axis leans by less than a degree, and
+/// which way its foot leans decides on which side its play is seated.
+const UPRIGHT: f64 = 6.0;
 /// Change points tried at most.
 const CHANGES: usize = 80;
 
@@ -144,7 +147,7 @@ pub fn conditions(measurements: &[&Measurement], rows: &Rows) -> Conditions {
         })
         .collect();
     let unknown =
-        |reading: &Reading, joint: usize| reading.posture.torque(joint).abs() < 3.0 * reading.posture.moment_sigma(joint);
+        |reading: &Reading, joint: usize| reading.posture.torque(joint).abs() < UPRIGHT * reading.posture.moment_sigma(joint);
     let upright = (0..count).map(|joint| readings.iter().all(|reading| unknown(reading, joint))).collect();
     let margin = (total / 10).max(3);
     let span = total.saturating_sub(2 * margin);

@@ -8,7 +8,13 @@ use super::outcome::Candidate;
 const WORTH_SAYING: f64 = 0.03;
 
 /// Sets of claims that the data cannot tell apart: each member of the best set that is not sure, with what may stand in its place.
-pub(super) fn confusion(analysis: &Analysis<'_>) -> Vec<Vec<Candidate>> {
+/// `named`: of each member of the best set, whether it is named; what is probable and not named stands here, be it alone.
+pub(super) fn confusion(analysis: &Analysis<'_>, named: &[Option<usize>]) -> Vec<Vec<Candidate>> {
+    let members = analysis.found.best.members.iter().zip(named);
+    let unnamed: Vec<Claim> = members
+        .filter(|((member, _), named)| named.is_none() && analysis.candidates.hypotheses[*member].kind.is_some())
+        .map(|((member, _), _)| claim(analysis, *member))
+        .collect();
     // All claims with their probabilities and one hypothesis that stands for each.
     let mut claims: Vec<(Claim, f64, usize)> = Vec::new();
     for (members, weight) in &analysis.found.models {
@@ -42,7 +48,7 @@ pub(super) fn confusion(analysis: &Analysis<'_>) -> Vec<Vec<Candidate>> {
             }
         }
     }
-    claims.retain(|(_, probability, _)| *probability >= WORTH_SAYING && *probability < SURE);
+    claims.retain(|(known, probability, _)| *probability >= WORTH_SAYING && (*probability < SURE || unnamed.contains(known)));
     // Claims of one set exclude each other: they are hardly ever in one model.
     let together = |a: &Claim, b: &Claim| -> f64 {
         let has =
@@ -63,9 +69,14 @@ pub(super) fn confusion(analysis: &Analysis<'_>) -> Vec<Vec<Candidate>> {
         }
     }
     sets.into_iter()
-        .filter(|set| set.len() > 1 && set.iter().map(|(_, probability, _)| probability).sum::<f64>() >= NAMED)
+        .filter(|set| {
+            (set.len() > 1 || unnamed.contains(&set[0].0))
+                && set.iter().map(|(_, probability, _)| probability).sum::<f64>() >= NAMED
+        })
         .map(|set| {
-            set.into_iter()
+            let alone = set.len() == 1;
+            let mut said: Vec<Candidate> = set
+                .into_iter()
                 .take(12)
                 .map(|((kind, _), probability, hypothesis)| Candidate {
                     kind: kind_name(kind),
@@ -73,7 +84,12 @@ pub(super) fn confusion(analysis: &Analysis<'_>) -> Vec<Vec<Candidate>> {
                     probability,
                     detail: analysis.candidates.hypotheses[hypothesis].detail.clone(),
                 })
-                .collect()
+                .collect();
+            if let Some(only) = said.first().cloned().filter(|_| alone) {
+                let detail = "something without a name that it stands in for".to_owned();
+                said.push(Candidate { kind: kind_name(None), probability: 1.0 - only.probability, detail, ..only });
+            }
+            said
         })
         .collect()
 }

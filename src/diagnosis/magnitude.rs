@@ -22,7 +22,11 @@ pub(super) fn magnitude(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -
     let unit = analysis.candidates.unit[hypothesis];
     let columns = analysis.candidates.columns(hypothesis);
     // Of a twist, the length of its translation.
-    let width = if matches!(of.shape, Shape::BaseDrift | Shape::BaseStep(_) | Shape::ToolStep(_)) { 3 } else { columns.len() };
+    let width = match of.shape {
+        Shape::BaseDrift | Shape::BaseStep(_) | Shape::ToolStep(_) => 3,
+        Shape::TwoHarmonics(_) => 2,
+        _ => columns.len(),
+    };
     let at: Vec<usize> = columns.take(width).filter_map(|column| fit.columns.iter().position(|known| *known == column)).collect();
     let value = |i: usize| fit.coefficients[at[i]] * unit * of.spread[i];
     let covariance = |i: usize, j: usize| fit.noise * fit.covariance[(at[i], at[j])] * unit * unit * of.spread[i] * of.spread[j];

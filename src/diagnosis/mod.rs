@@ -169,7 +169,17 @@ pub fn diagnose(
             (far, dependent, before) = (weighed.far, weighed.dependent, members);
             continue;
         }
-        let outliers = outliers::look(&weighed.squares, rows.per_row);
+        let mut outliers = outliers::look(&weighed.squares, rows.per_row);
+        // What play makes of a reading whose side nobody knows says nothing about the sensor.
+        let members = &found.best.members;
+        let seated = |row: &usize| {
+            !members.iter().any(|(member, _)| candidates.hypotheses[*member].shape.undecided(&conditions.readings[*row]))
+        };
+        let sure: Vec<f64> = (0..total).filter(seated).map(|row| weighed.squares[row]).collect();
+        if sure.len() < total && 2 * sure.len() >= total {
+            let far_off = std::mem::take(&mut outliers.rows);
+            outliers = outliers::Outliers { rows: far_off, ..outliers::look(&sure, rows.per_row) };
+        }
         let good: Vec<bool> = (0..total).map(|row| !outliers.rows.contains(&row)).collect();
         let held_out: Vec<held_out::HeldOut> = schemes
             .iter()

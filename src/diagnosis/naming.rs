@@ -37,7 +37,9 @@ pub(super) fn name(analysis: &Analysis<'_>, closing: &Closing<'_>, unknown: bool
         let needed = if unknown { SURE } else { NAMED };
         let before_unknown = analysis.found.best.members[..step].iter().all(|(other, _)| has_name(*other));
         let helps = closing.after(step + 1) < closing.after(step);
-        let stable = !unknown || (before_unknown && helps && 5 * chosen >= 4 * folds.len());
+        // One of some thousands of ripples fits scatter, too.
+        let ripple = of.kind == Some(Kind::StrainWaveError);
+        let stable = (!ripple || helps) && (!unknown || (before_unknown && helps && 5 * chosen >= 4 * folds.len()));
         let Some(fit) = unpulled.as_ref().filter(|_| probability >= needed && stable) else {
             continue;
         };

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::evidence::{Candidates, Model, NoisePrior, extensions, log_posterior};
+use super::evidence::{Candidates, Model, NoisePrior, SCALES, extensions, log_posterior};
 use super::gram::Surviving;
+use crate::effects::signature::shape::Shape;
 use crate::effects::{Kind, Location};
 
 /// Most effects of a set.
@@ -23,6 +24,9 @@ pub struct Found {
 }
 
 type Key = Vec<usize>;
+
+/// Kinds (or none) at places, sorted.
+type Claims = Vec<(Option<Kind>, Location)>;
 
 /// Models explored: of each set of hypotheses, the best scales and the logarithm of the sum over scales.
 #[derive(Default)]
@@ -99,6 +103,7 @@ pub fn search(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior,
             break;
         }
     }
+    one_by_one(surviving, candidates, noise, &mut explored);
     // Swaps and deletions about the best, until there is none better.
     for _ in 0..6 {
         let Some(best) = explored.best().cloned() else {
@@ -115,7 +120,8 @@ pub fn search(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior,
                 }
             }
         }
-        if best.members.len() < most {
+        let yields = |(member, _): &&(usize, usize)| candidates.hypotheses[*member].kind == Some(Kind::JointCompliance);
+        if best.members.len() - best.members.iter().filter(yields).count() < most {
             for model in extensions(surviving, candidates, noise, &best.members) {
                 if model.log_posterior > best.log_posterior - NEGLIGIBLE {
                     explored.add(exact(&model));
@@ -130,7 +136,7 @@ pub fn search(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior,
     let mut models = Vec::new();
     let mut total = 0.0;
     // What is claimed, whatever the variant: a step has as many as there are moments.
-    let mut claims: BTreeMap<Vec<(Option<Kind>, Location)>, (f64, &Model)> = BTreeMap::new();
+    let mut claims: BTreeMap<Claims, (f64, &Model)> = BTreeMap::new();
     for of_set in explored.sets.values() {
         let weight: f64 = of_set.values().map(|model| libm::exp(model.log_posterior - top)).sum();
         let Some(best) = of_set.values().max_by(|a, b| a.log_posterior.total_cmp(&b.log_posterior)) else {
@@ -139,7 +145,7 @@ pub fn search(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior,
         models.push((best.members.clone(), weight));
         total += weight;
         let claim = |(member, _): &(usize, usize)| (candidates.hypotheses[*member].kind, candidates.hypotheses[*member].location);
-        let mut claimed: Vec<_> = best.members.iter().map(claim).collect();
+        let mut claimed: Claims = best.members.iter().map(claim).collect();
         claimed.sort_unstable();
         let known = claims.entry(claimed).or_insert((0.0, best));
         known.0 += weight;
@@ -156,6 +162,46 @@ pub fn search(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior,
     models.truncate(400);
     let members = in_order(surviving, candidates, noise, &best.members);
     Found { best: Model { members, ..best }, models }
+}
+
+/// Where all joints are said to yield alike, lets each yield by itself, as far as that is better: no swap of one for one goes there.
+fn one_by_one(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior, explored: &mut Explored) {
+    let Some(best) = explored.best().cloned() else {
+        return;
+    };
+    let shape = |member: usize| candidates.hypotheses[member].shape;
+    if !best.members.iter().any(|(member, _)| shape(*member) == Shape::AllYield) {
+        return;
+    }
+    let alone = |member: usize| candidates.active[member] && matches!(shape(member), Shape::Torque(_));
+    let mut members: Vec<(usize, usize)> =
+        best.members.iter().copied().filter(|(member, _)| shape(*member) != Shape::AllYield).collect();
+    for member in (0..candidates.hypotheses.len()).filter(|member| alone(*member)) {
+        if !members.iter().any(|(known, _)| candidates.exclude(*known, member)) {
+            members.push((member, 0));
+        }
+    }
+    let value = |members: &[(usize, usize)]| log_posterior(surviving, candidates, noise, members);
+    let mut now = value(&members);
+    loop {
+        explored.add(Model { members: members.clone(), log_posterior: now });
+        let mut tries: Vec<Vec<(usize, usize)>> = Vec::new();
+        for at in 0..members.len() {
+            let mut fewer = members.clone();
+            fewer.remove(at);
+            tries.push(fewer);
+            for scale in (0..SCALES.len()).filter(|scale| *scale != members[at].1) {
+                let mut other = members.clone();
+                other[at].1 = scale;
+                tries.push(other);
+            }
+        }
+        let valued = tries.into_iter().map(|members| (value(&members), members));
+        match valued.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((better, next)) if better > now + 1e-9 => (now, members) = (better, next),
+            _ => break,
+        }
+    }
 }
 
 /// The members in the order in which each adds most to what those before it explain.

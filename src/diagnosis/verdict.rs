@@ -26,7 +26,7 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
     let gap = closing.gap();
     let unknown = unknown(analysis, level, &noise_floor);
     let named = name(analysis, &closing, unknown.present);
-    let confusion_sets = confusion(analysis);
+    let confusion_sets = confusion(analysis, &named.of_member);
     let power = detectability(analysis, level);
     let verdict = decide(&unknown, &named.effects, &confusion_sets, power.share);
     Diagnosis {

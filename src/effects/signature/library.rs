@@ -12,8 +12,12 @@ pub const WAVES_PER_TURN: [u16; 6] = [60, 100, 160, 200, 240, 320];
 pub const RIPPLES: std::ops::RangeInclusive<u16> = 5..=400;
 /// Of the prior of strain-wave errors, the share of ratios that are not sold off the shelf.
 const OTHER_RATIOS: f64 = 0.3;
+/// Of the prior of bending, the share of a link that is a slender beam; others yield where they are bolted to their joint.
+const BEAM: f64 = 0.2;
+/// Shares of the load that friction may hold where only a lean seats the play: far more than where the load itself does.
+const LEANING_HELD: [f64; 5] = [0.0, 0.08, 0.16, 0.24, 0.32];
 /// Azimuths in which gravity may lean.
-const LEANS: usize = 16;
+const LEANS: usize = 24;
 
 /// Shares of the load that the friction of a fit may hold in the middle of its play.
 pub const HELD: [f64; 4] = [0.0, 0.02, 0.05, 0.1];
@@ -97,16 +101,18 @@ pub fn library(mechanism: &Mechanism, columns: &Columns) -> Vec<Hypothesis> {
         let soft = if 2 * joint < count { [1.0 / 6e4, 1.0 / 1e4] } else { [1.0 / 1.5e4, 1.0 / 2e3] };
         let soft = soft.map(|compliance| compliance * load);
         all.push(simple(Kind::JointCompliance, at, Shape::Torque(joint), soft));
-        all.push(simple(Kind::LinkBending, at, Shape::MomentAcross(joint), [0.5e-5 * load, 5e-5 * load]));
+        let bends = simple(Kind::LinkBending, at, Shape::MomentAcross(joint), [0.5e-5 * load, 5e-5 * load]);
+        all.push(Hypothesis { share: Some(1.0 - BEAM), ..bends.clone() });
+        all.push(Hypothesis { shape: Shape::Beam(joint), share: Some(BEAM), detail: "as a beam".to_owned(), ..bends });
         let width = [20.0 * ARCSEC, 120.0 * ARCSEC];
         if columns.approach {
             all.push(simple(Kind::Backlash, at, Shape::Direction(joint), width));
         }
         all.push(simple(Kind::GravityLostMotion, at, Shape::TorqueSign(joint), width));
         if turns && columns.upright[joint] {
-            for step in 0..LEANS {
+            for (step, held) in (0..LEANS).flat_map(|step| LEANING_HELD.map(|held| (step, held))) {
                 let azimuth = step as f64 * std::f64::consts::TAU / LEANS as f64;
-                let leaning = simple(Kind::GravityLostMotion, at, Shape::LeaningTorqueSign { joint, azimuth }, width);
+                let leaning = simple(Kind::GravityLostMotion, at, Shape::LeaningTorqueSign { joint, azimuth, held }, width);
                 let detail = format!("seated as if the axis leant towards {:.0}°", azimuth.to_degrees());
                 all.push(Hypothesis { detail, ..leaning });
             }
@@ -118,6 +124,9 @@ pub fn library(mechanism: &Mechanism, columns: &Columns) -> Vec<Hypothesis> {
                 let eccentricity = simple(Kind::JointEccentricity, at, shape, [10.0 * ARCSEC, 100.0 * ARCSEC]);
                 all.push(Hypothesis { spread: vec![half; 2], detail, ..eccentricity });
             }
+            let both = simple(Kind::JointEccentricity, at, Shape::TwoHarmonics(joint), [10.0 * ARCSEC, 100.0 * ARCSEC]);
+            let detail = "1 and 2 periods per turn; the magnitude is that of the first".to_owned();
+            all.push(Hypothesis { spread: vec![half; 4], detail, ..both });
             all.extend(WAVES_PER_TURN.map(|waves| ripple(joint, waves, false)));
         }
         // Motion leaks from the joint before, whose drive shares the housing; the first has none before it.
@@ -142,6 +151,10 @@ pub fn library(mechanism: &Mechanism, columns: &Columns) -> Vec<Hypothesis> {
     }
     if columns.temperature {
         all.push(simple(Kind::LinkThermalGrowth, None, Shape::Growth(None), [12e-6, 24e-6]));
+        for (grows, detail) in [(true, "the foot as warm as the first link"), (false, "the foot does not grow")] {
+            let growth = simple(Kind::LinkThermalGrowth, None, Shape::GrowthOnFoot { grows }, [12e-6, 24e-6]);
+            all.push(Hypothesis { detail: detail.to_owned(), ..growth });
+        }
     }
     // A translation of so many metres comes with a rotation of up to as many radians.
     let third = 1.0 / libm::sqrt(3.0);
@@ -163,7 +176,7 @@ pub fn library(mechanism: &Mechanism, columns: &Columns) -> Vec<Hypothesis> {
         shape: Shape::AllYield,
         range: [2e-5, 1.5e-4],
         spread: vec![1.0; 2],
-        detail: "all joints yield, as under a payload that is not the recorded one".to_owned(),
+        detail: "all joints yield alike, or carry what is not recorded".to_owned(),
         share: None,
     });
     all.push(simple(Kind::MeasurementScale, None, Shape::Scale, [10e-6, 100e-6]));

@@ -11,12 +11,17 @@ pub enum Shape {
     Torque(usize),
     /// \[1\] A turn about a joint's origin in proportion to the moment across its axis.
     MomentAcross(usize),
+    /// \[1\] A link bends as a beam from its joint to the next under the moment across its own direction, which may change along
+    /// it: a turn in proportion to the mean moment, about where a beam turns.
+    Beam(usize),
     /// \[1\] A joint is off by half a unit in the direction of its last move.
     Direction(usize),
     /// \[1\] A joint is off by half a unit in the direction of its torque.
     TorqueSign(usize),
     /// \[2\] Cosine and sine of so many times a joint's angle turn it.
     Harmonic(usize, f64),
+    /// \[4\] Cosine and sine of a joint's angle, and of twice the angle, turn it.
+    TwoHarmonics(usize),
     /// \[1\] A joint turns by the angle of another, or of its own.
     Ratio {
         /// The joint that errs.
@@ -26,6 +31,11 @@ pub enum Shape {
     },
     /// \[1\] A link grows with its temperature; all, and the foot, where there is none.
     Growth(Option<usize>),
+    /// \[1\] All links grow with their temperatures, and the foot with that of the first link, or not at all.
+    GrowthOnFoot {
+        /// Whether the foot grows.
+        grows: bool,
+    },
     /// \[1\] A joint turns with the temperature of its link.
     Warmth(usize),
     /// \[1\] A shift along the force across a joint's axis. Friction of the fit holds what carries less than the share `held` of the
@@ -51,6 +61,9 @@ pub enum Shape {
         joint: usize,
         /// rad, from the first axis across ([`across`]).
         azimuth: f64,
+        /// Friction holds the play in the middle where the lever towards which gravity leans carries less than this share of the force
+        /// times the length of the arm outboard.
+        held: f64,
     },
     /// \[2\] A turn about a joint's origin: the moments about the x and y axes of its link bend it unequally.
     UnequalBend(usize),
@@ -217,6 +230,22 @@ impl Shape {
         match *self {
             Shape::Torque(joint) => vec![reading.moved(joint, reading.effort(joint))],
             Shape::MomentAcross(joint) => vec![reading.turned(joint, posture.moment_across(joint))],
+            Shape::Beam(joint) => {
+                let next = if joint + 1 < reading.joints.len() { posture.origins[joint + 1] } else { posture.tool };
+                let along = next - posture.origins[joint];
+                let square = along.norm_squared();
+                // Too short to have a direction: a hinge.
+                if square < 1e-6 {
+                    return vec![reading.turned(joint, posture.moment_across(joint))];
+                }
+                let across = |moment: Vector3<f64>| moment - along * (along.dot(&moment) / square);
+                // Its own weight is a small part of what it carries: the moment at its end is that at its root without the lever.
+                let near = across(posture.moments[joint]);
+                let far = across(posture.moments[joint] - along.cross(&posture.forces[joint]));
+                let turn = (near + far) / 2.0;
+                let bow = (near / 3.0 + far / 6.0).cross(&along);
+                vec![twist(bow + turn.cross(&(reading.target - next)), turn)]
+            }
             Shape::Direction(joint) => vec![reading.moved(joint, 0.5 * reading.approach[joint])],
             Shape::TorqueSign(joint) => {
                 let effort = reading.effort(joint);
@@ -226,6 +255,9 @@ impl Shape {
             Shape::Harmonic(joint, order) => {
                 let (sine, cosine) = libm::sincos(order * reading.joints[joint]);
                 vec![reading.moved(joint, cosine), reading.moved(joint, sine)]
+            }
+            Shape::TwoHarmonics(joint) => {
+                [1.0, 2.0].iter().flat_map(|order| Shape::Harmonic(joint, *order).columns(reading, attitude)).collect()
             }
             Shape::Ratio { joint, source } => vec![reading.moved(joint, reading.joints[source])],
             Shape::Growth(link) => {
@@ -238,6 +270,15 @@ impl Shape {
                 };
                 vec![twist(shift, Vector3::zeros())]
             }
+            Shape::GrowthOnFoot { grows } => {
+                let foot = if grows { reading.rise_k[0] } else { 0.0 };
+                let change = posture.origins[0] * (foot - reading.foot_rise_k);
+                let mut column = Shape::Growth(None).columns(reading, attitude)[0];
+                for (value, change) in column.iter_mut().zip(change.iter()) {
+                    *value += change;
+                }
+                vec![column]
+            }
             Shape::Warmth(joint) => vec![reading.moved(joint, reading.rise_k[joint])],
             Shape::ForceAcrossSign { joint, held } => {
                 let (load, sigma) = (posture.force_across(joint), posture.force_sigma(joint));
@@ -247,14 +288,15 @@ impl Shape {
                 let (load, sigma) = (posture.moment_across(joint), posture.moment_sigma(joint));
                 vec![reading.turned(joint, seated(load, sigma, held * posture.forces[joint].norm() * posture.reaches[joint]))]
             }
-            Shape::LeaningTorqueSign { joint, azimuth } => {
+            Shape::LeaningTorqueSign { joint, azimuth, held } => {
                 // First moment of the mass outboard, across gravity; where gravity leans towards `lean` the torque follows `lean · lever`.
                 let gravity = reading.gravity;
-                let lever = gravity.cross(&posture.moments[joint]);
+                let lever = gravity.cross(&posture.moments[joint]) / gravity.norm().max(1e-12);
                 let (x, y) = across(&posture.axes[joint]);
                 let lean = x * libm::cos(azimuth) + y * libm::sin(azimuth);
-                let share = lean.dot(&lever) / lever.norm().max(1e-12);
-                vec![reading.moved(joint, 0.5 * share / libm::hypot(share, LEAN_EDGE))]
+                let all = posture.forces[joint].norm() * posture.reaches[joint];
+                let seat = seated(lean * lean.dot(&lever), LEAN_EDGE * lever.norm(), held * all);
+                vec![reading.moved(joint, 0.5 * lean.dot(&seat))]
             }
             Shape::UnequalBend(joint) => {
                 let moment = posture.moment_across(joint);
@@ -341,6 +383,35 @@ impl Shape {
         }
     }
 
+    /// Whether nobody knows to which side this is seated at `reading`: the load is next to nothing, and friction or a base that is not
+    /// level may decide.
+    #[must_use]
+    pub fn undecided(&self, reading: &Reading) -> bool {
+        let posture = &reading.posture;
+        let little = |load: f64, sigma: f64, all: f64| load < f64::max(4.0 * sigma, 0.02 * all);
+        match *self {
+            Shape::TorqueSign(joint) if reading.slides[joint] => {
+                little(reading.effort(joint).abs(), posture.force_sigma(joint), posture.forces[joint].norm())
+            }
+            Shape::TorqueSign(joint) => {
+                little(reading.effort(joint).abs(), posture.moment_sigma(joint), posture.moments[joint].norm())
+            }
+            Shape::LeaningTorqueSign { joint, .. } => {
+                let [x, y, z, ..] = self.columns(reading, false)[0];
+                let [a, b, c, ..] = reading.moved(joint, 0.5);
+                Vector3::new(x, y, z).norm() < 0.9 * Vector3::new(a, b, c).norm()
+            }
+            Shape::ForceAcrossSign { joint, .. } => {
+                little(posture.force_across(joint).norm(), posture.force_sigma(joint), posture.forces[joint].norm())
+            }
+            Shape::MomentAcrossSign { joint, .. } => {
+                let reach = posture.forces[joint].norm() * posture.reaches[joint];
+                little(posture.moment_across(joint).norm(), posture.moment_sigma(joint), reach)
+            }
+            _ => false,
+        }
+    }
+
     /// Number of columns.
     #[must_use]
     pub fn width(&self, attitude: bool) -> usize {
@@ -355,6 +426,7 @@ impl Shape {
             | Shape::AllYield
             | Shape::TimeCurve(_) => 2,
             Shape::AngleCurve(_) => 3,
+            Shape::TwoHarmonics(_) => 4,
             Shape::AngleMap { .. } => MAP_ORDERS,
             Shape::BaseDrift | Shape::BaseStep(_) | Shape::BaseCourse(_) => 6,
             Shape::ToolStep(_) | Shape::ToolCourse(_) => {
@@ -381,7 +453,7 @@ fn seated(load: Vector3<f64>, sigma: f64, friction: f64) -> Vector3<f64> {
 
 /// Share of the largest torque below which nobody knows on which side a leaning joint's play is seated: the azimuth of the lean is
 /// known to half a step between those that are tried.
-const LEAN_EDGE: f64 = 0.15;
+const LEAN_EDGE: f64 = 0.1;
 
 /// Two directions across `axis` that do not turn with the joint.
 #[must_use]

@@ -13,6 +13,9 @@ use crate::arm::{Arm, Geometry, Inertial, Link, Shape};
 use crate::frames::Pose;
 use crate::kinematics::{Chain, Joint, JointKind, Step};
 
+/// Radius of the ball whose inertia a link gets that has an impossible one, m.
+const BALL_M: f64 = 0.05;
+
 /// Largest number of an origin, m or rad, that is taken for meant.
 const LARGEST: f64 = 1000.0;
 
@@ -486,11 +489,17 @@ impl<'a> Build<'a> {
             }
         }
         let inertial = sum(&masses);
+        // Rounded tables break the tensor; weight and where it acts are right all the same.
         let inertial = match inertial.as_ref().and_then(Inertial::impossible) {
             None => inertial,
             Some((found, _)) => {
-                self.notes.push(format!("link {name}: {found} belong to no body, so its mass is left out"));
-                None
+                self.notes.push(format!(
+                    "link {name}: {found} belong to no body; mass and centre are kept, with the inertia of a ball"
+                ));
+                inertial.map(|inertial| Inertial {
+                    inertia_in_link: Matrix3::identity() * (0.4 * BALL_M * BALL_M * inertial.mass_kg),
+                    ..inertial
+                })
             }
         };
         Ok(Link { name: name.to_owned(), inertial, shapes })

@@ -337,10 +337,13 @@ fn what_is_wrong_is_named_with_line_element_and_remedy() {
 }
 
 #[test]
-fn an_inertia_of_no_body_is_left_out_and_noted() {
+fn an_inertia_of_no_body_is_noted_and_its_mass_kept() {
     let text = ODD.replacen("izz=\"0.04\"", "izz=\"4\"", 1);
     let result = import(&text, "robot.urdf", None, Some("probe")).expect("good enough for kinematics");
-    assert_eq!(result.arm.links[1].inertial, None);
+    let right = import(ODD, "robot.urdf", None, Some("probe")).expect("right").arm.links[1].inertial.clone().expect("a mass");
+    let kept = result.arm.links[1].inertial.as_ref().expect("a mass");
+    assert_eq!((kept.mass_kg, kept.centre_of_mass_in_link), (right.mass_kg, right.centre_of_mass_in_link));
+    assert!(kept.impossible().is_none());
     assert!(result.notes.iter().any(|note| note.starts_with("link a: principal moments")), "{:?}", result.notes);
 }
 
