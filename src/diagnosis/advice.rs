@@ -39,6 +39,13 @@ pub(super) fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], power: &Det
             say("a shape without a name: more configurations where it shows");
         }
     }
+    for one in &analysis.scatter {
+        say(&format!(
+            "joint {}: read a few configurations many times, with a move of this joint alone between, from both sides in turn, and record \
+             the side",
+            one.joint + 1
+        ));
+    }
     // What these readings could not have shown, whatever they did show.
     let places = |kind: Kind| -> Vec<String> {
         let of_kind = power.undetectable.iter().filter(|one| one.kind == kind.name() && one.minimum_detectable.value.is_none());

@@ -14,6 +14,7 @@ use super::gram::{Gram, Surviving};
 use super::groups::Groups;
 use super::rows::Rows;
 use super::search::search;
+use super::whitening::Whitening;
 use crate::measurement::Measurement;
 
 /// Rows of the linear problem with what the search needs.
@@ -21,8 +22,8 @@ use crate::measurement::Measurement;
 pub struct Problem {
     /// `[geometry | signatures | residual]`, m and rad.
     pub raw: DMatrix<f64>,
-    /// One over sigma of each equation, times the root of its row's weight.
-    pub whitening: DVector<f64>,
+    /// What makes the equations alike in noise, and weighs the rows.
+    pub whitening: Whitening,
     /// Equations per row.
     pub per_row: usize,
     /// Geometric parameters.
@@ -55,15 +56,8 @@ impl Problem {
         (0..scheme.folds)
             .into_par_iter()
             .map(|number| {
-                let of_fold = (0..scheme.fold.len()).filter(|row| scheme.fold[*row] == number);
-                let equations: Vec<usize> = of_fold.flat_map(|row| row * self.per_row..(row + 1) * self.per_row).collect();
-                let mut block = self.raw.select_rows(&equations);
-                for mut column in block.column_iter_mut() {
-                    for (value, equation) in column.iter_mut().zip(&equations) {
-                        *value *= self.whitening[*equation];
-                    }
-                }
-                Gram::new(&block, self.geometry)
+                let of_fold: Vec<usize> = (0..scheme.fold.len()).filter(|row| scheme.fold[*row] == number).collect();
+                Gram::new(&self.whitening.of_rows(&self.raw, &of_fold), self.geometry)
             })
             .collect()
     }
@@ -127,6 +121,14 @@ pub struct HeldOut {
     pub by: Block,
     /// Fold by fold.
     pub folds: Vec<Fold>,
+}
+
+impl HeldOut {
+    /// Sum of the squares of all held-out positions with the effects that are used, m².
+    #[must_use]
+    pub fn explained(&self) -> f64 {
+        self.folds.iter().map(Fold::all).sum()
+    }
 }
 
 /// A way of leaving rows out.

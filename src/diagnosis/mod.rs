@@ -26,6 +26,7 @@ mod parameters;
 pub mod power;
 mod ripple;
 pub mod rows;
+pub mod scatter;
 pub mod search;
 mod sentence;
 #[cfg(test)]
@@ -34,6 +35,7 @@ mod unknown;
 mod verdict;
 pub mod waterfall;
 mod weights;
+pub mod whitening;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -51,11 +53,16 @@ use held_out::{Block, Problem};
 use outcome::{Diagnosis, NoiseSource};
 use ripple::Ripple;
 use rows::{DiagnosisError, Readings, Rows};
+use scatter::Scatter;
 
 /// Folds of the cross-validation.
 pub const FOLDS: usize = 5;
 /// Rounds of fitting around what was found.
 const PASSES: usize = 5;
+/// Times that what was found is looked through for joints that do not repeat.
+const LOOKS: usize = 3;
+/// Held-out RMS with joints that do not repeat, over that without, from which on there are none.
+const WORSE: f64 = 1.03;
 
 /// How to diagnose.
 #[derive(Clone, Debug, PartialEq)]
@@ -99,6 +106,8 @@ pub(crate) struct Analysis<'a> {
     pub(crate) held_out: Vec<held_out::HeldOut>,
     pub(crate) structure: open_set::Structure,
     pub(crate) outliers: outliers::Outliers,
+    /// Joints that do not repeat.
+    pub(crate) scatter: Vec<Scatter>,
     pub(crate) maps: Vec<outcome::Map>,
     pub(crate) residuals: Vec<outcome::Residual>,
     /// Of each row, which member of the best set moves it most.
@@ -130,11 +139,15 @@ pub fn diagnose(
     let mut displacement: Vec<Displacement> = Vec::new();
     let mut before = Vec::new();
     let mut ripples: Vec<Ripple> = Vec::new();
+    let mut scatter: Vec<Scatter> = Vec::new();
+    let (mut last, mut looks) = (PASSES - 1, 0);
+    let mut plain = None;
     // Around the arm as it is with the effects found so far, until nothing changes: signatures are those of the fitted arm, readings
     // that are far off from the best model or that repeat others are weighted down, and geometry and effects are fitted together.
-    for pass in 0..PASSES {
+    for pass in 0.. {
         let weights: Vec<f64> = dependent.iter().zip(&far).map(|(a, b)| a * b).collect();
-        let rows = rows::fit(arm, Readings { sensor, measurements, weights: &weights, displacement: &displacement })?;
+        let rows =
+            rows::fit(arm, Readings { sensor, measurements, weights: &weights, displacement: &displacement, scatter: &scatter })?;
         let conditions = conditions::conditions(measurements, &rows);
         let hypotheses = options.hypotheses(&rows, &conditions, &ripples);
         let (mut raw, mut candidates) = matrix(&rows, &conditions, hypotheses);
@@ -157,13 +170,13 @@ pub fn diagnose(
         let mut members: Vec<(usize, usize)> = found.best.members.clone();
         members.sort_unstable();
         let settled = same(&weighed.far, &far) && same(&weighed.dependent, &dependent) && members == before;
-        let more = if pass + 1 < PASSES {
+        let more = if pass < last {
             let level = evidence::noise_level(&surviving, &candidates, noise, &found.best.members);
             ripple::scan(&problem, &conditions.readings, &residual, level, &candidates)
         } else {
             Vec::new()
         };
-        if pass + 1 < PASSES && (!settled || !more.is_empty()) {
+        if pass < last && (!settled || !more.is_empty()) {
             ripples.extend(more);
             displacement = displaced(&problem, &rows, &coefficients);
             (far, dependent, before) = (weighed.far, weighed.dependent, members);
@@ -171,7 +184,6 @@ pub fn diagnose(
         }
         let mut outliers = outliers::look(&weighed.squares, rows.per_row);
         // What play makes of a reading whose side nobody knows says nothing about the sensor.
-        let members = &found.best.members;
         let seated = |row: &usize| {
             !members.iter().any(|(member, _)| candidates.hypotheses[*member].shape.undecided(&conditions.readings[*row]))
         };
@@ -181,6 +193,32 @@ pub fn diagnose(
             outliers = outliers::Outliers { rows: far_off, ..outliers::look(&sure, rows.per_row) };
         }
         let good: Vec<bool> = (0..total).map(|row| !outliers.rows.contains(&row)).collect();
+        let validate =
+            |good: &[bool]| held_out::cross_validate(&problem, &schemes[0], good, &grams, &candidates, noise, search::MOST);
+        // Then, whether a joint does not repeat: its errors are no evidence of anything else.
+        let scattered =
+            if looks < LOOKS { scatter::look(&rows, &problem, &surviving, &candidates, noise, &found) } else { scatter.clone() };
+        if scattered != scatter {
+            if let (true, None) = (scatter.is_empty(), &plain) {
+                let left = validate(&good).explained();
+                let state = (far.clone(), dependent.clone(), displacement.clone(), ripples.clone(), before.clone());
+                plain = Some((left, good, state));
+            }
+            displacement = displaced(&problem, &rows, &coefficients);
+            (far, dependent, before) = (weighed.far, weighed.dependent, members);
+            scatter = scattered;
+            (last, looks) = (pass + PASSES, looks + 1);
+            continue;
+        }
+        // Scatter has no order: where readings that were not used are predicted worse with it, there was an order that it took the place of.
+        if let (false, Some((left, good, state))) = (scatter.is_empty(), plain.take()) {
+            if validate(&good).explained() > WORSE * WORSE * left {
+                (far, dependent, displacement, ripples, before) = state;
+                scatter.clear();
+                (last, looks) = (pass + 1, LOOKS);
+                continue;
+            }
+        }
         let held_out: Vec<held_out::HeldOut> = schemes
             .iter()
             .map(|scheme| {
@@ -188,20 +226,15 @@ pub fn diagnose(
                 held_out::cross_validate(&problem, scheme, &good, &grams, &candidates, noise, search::MOST)
             })
             .collect();
-        let position = |weighted: bool| -> Vec<Vector3<f64>> {
-            (0..total)
-                .map(|row| {
-                    let first = row * rows.per_row;
-                    let weight = if weighted { problem.whitening[first] } else { 1.0 };
-                    Vector3::from(residual.fixed_rows::<3>(first)) * weight
-                })
-                .collect()
+        let positions = |of: &DVector<f64>| -> Vec<Vector3<f64>> {
+            (0..total).map(|row| Vector3::from(of.fixed_rows::<3>(row * rows.per_row))).collect()
         };
         let moved = moved_most(&problem, &surviving, &candidates, &coefficients, &found.best.members);
         let geometry_alone = problem.left(&surviving, &DVector::zeros(coefficients.len()));
         let residuals = residuals(&rows, measurements, &geometry_alone, &residual);
-        let structure = open_set::structure(&conditions, &position(true), &groups.alike(measurements));
-        let maps = open_set::maps(&conditions, &position(false));
+        let structure =
+            open_set::structure(&conditions, &positions(&problem.whitening.of_vector(&residual)), &groups.alike(measurements));
+        let maps = open_set::maps(&conditions, &positions(&residual));
         let analysis = Analysis {
             rows: &rows,
             conditions: &conditions,
@@ -212,6 +245,7 @@ pub fn diagnose(
             held_out,
             structure,
             outliers,
+            scatter,
             maps,
             residuals,
             moved,
@@ -223,7 +257,7 @@ pub fn diagnose(
         };
         return Ok(verdict::put(&analysis));
     }
-    Err(DiagnosisError::Degenerate)
+    unreachable!("the loop ends by returning")
 }
 
 /// A data set around its calibrated geometry, ready for the evidence of single effects.
@@ -242,13 +276,13 @@ impl Singles {
     /// As [`diagnose`].
     pub fn new(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], options: &Options) -> Result<Singles, DiagnosisError> {
         let weights = vec![1.0; measurements.len()];
-        let rows = rows::fit(arm, Readings { sensor, measurements, weights: &weights, displacement: &[] })?;
+        let rows = rows::fit(arm, Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[] })?;
         let conditions = conditions::conditions(measurements, &rows);
         let hypotheses = options.hypotheses(&rows, &conditions, &[]);
         let (raw, candidates) = matrix(&rows, &conditions, hypotheses);
         let groups = groups::groups(measurements);
         let noise = noise_prior(groups::repeats(measurements, &groups), mean_sigma(sensor, measurements), options.noise);
-        Ok(Singles { whitened: rows::scaled(&raw, &rows.whitening), problem: Problem::new(&rows, raw), candidates, noise })
+        Ok(Singles { whitened: rows.whitening.of(&raw), problem: Problem::new(&rows, raw), candidates, noise })
     }
 
     /// The evidence of every hypothesis alone, at every scale of its prior: geometry taken out, marginal likelihoods. Signatures are

@@ -68,7 +68,9 @@ fn outliers(analysis: &Analysis<'_>, closing: &Closing<'_>, unknown: bool) -> Op
     let is_left_out = analysis.options.without.contains(&Kind::MeasurementOutliers);
     // A misfit has tails, too.
     let enough = if unknown { 9.0 } else { 4.0 };
-    let named = outliers.probability >= NAMED && outliers.factor >= enough && !is_left_out;
+    // So has the error of a joint that does not repeat.
+    let scatters = !analysis.scatter.is_empty();
+    let named = outliers.probability >= NAMED && outliers.factor >= enough && !is_left_out && !scatters;
     named.then(|| Effect {
         kind: Kind::MeasurementOutliers.name().to_owned(),
         location: Place { level: Level::Sensor, index: None, time_s: None },

@@ -36,11 +36,8 @@ pub(super) fn scan(
 ) -> Vec<Ripple> {
     use rayon::prelude::*;
     let geometry = problem.geometry;
-    let mut jacobian = problem.raw.columns(0, geometry).into_owned();
-    for (equation, mut row) in jacobian.row_iter_mut().enumerate() {
-        row *= problem.whitening[equation];
-    }
-    let jacobian = jacobian.transpose();
+    let jacobian = problem.whitening.of(&problem.raw.columns(0, geometry).into_owned()).transpose();
+    let residual = problem.whitening.of_vector(residual);
     let Some(normal) = Cholesky::new(&jacobian * jacobian.transpose() + DMatrix::identity(geometry, geometry)) else {
         return Vec::new();
     };
@@ -58,14 +55,13 @@ pub(super) fn scan(
             let mut mixed = DMatrix::zeros(geometry, readings.len());
             let (mut own, mut with) = (vec![0.0; readings.len()], vec![0.0; readings.len()]);
             for (row, reading) in readings.iter().enumerate() {
-                let moved = reading.moved(joint, 1.0);
-                for (axis, value) in moved.iter().take(per_row).enumerate() {
+                let moved = DVector::from_row_slice(&reading.moved(joint, 1.0)[..per_row]);
+                let moved = problem.whitening.of_row(row, moved.rows(0, per_row));
+                for (axis, value) in moved.iter().enumerate() {
                     let equation = row * per_row + axis;
-                    let weight = problem.whitening[equation];
-                    let value = value * weight;
                     own[row] += value * value;
-                    with[row] += value * residual[equation] * weight;
-                    mixed.column_mut(row).axpy(value, &jacobian.column(equation), 1.0);
+                    with[row] += value * residual[equation];
+                    mixed.column_mut(row).axpy(*value, &jacobian.column(equation), 1.0);
                 }
             }
             let absorbed = lower.solve_lower_triangular(&mixed)?;

@@ -6,6 +6,8 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::mistake;
+use super::scatter::{self, Scatter};
+use super::whitening::Whitening;
 use crate::arm::Arm;
 use crate::effects::signature::posture::{Mechanism, Posture};
 use crate::effects::signature::shape::Displacement;
@@ -93,8 +95,8 @@ pub struct Rows {
     pub per_row: usize,
     /// Residuals, m and rad.
     pub residual: DVector<f64>,
-    /// One over sigma of each equation.
-    pub whitening: DVector<f64>,
+    /// What makes the equations alike in noise.
+    pub whitening: Whitening,
     /// What each geometric parameter, scaled by its prior's sigma, does.
     pub jacobian: DMatrix<f64>,
     /// The fitted parameters over the sigmas of their priors.
@@ -128,6 +130,8 @@ pub struct Readings<'a> {
     pub weights: &'a [f64],
     /// What effects that are already known do to the target: shift (m) and turn (rad) in root, row by row; empty for nothing.
     pub displacement: &'a [Displacement],
+    /// Joints that do not repeat.
+    pub scatter: &'a [Scatter],
 }
 
 /// Fits base, target and geometry of `arm` to `readings`. Sessions get bases of their own where that is worth it.
@@ -176,7 +180,7 @@ pub fn fit(arm: &Arm, readings: Readings<'_>) -> Result<Rows, DiagnosisError> {
 
 /// As [`fit`]; `session` of each row, `bases` of them.
 fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], bases: usize) -> Result<Rows, DiagnosisError> {
-    let Readings { sensor, measurements, weights, displacement } = readings;
+    let Readings { sensor, measurements, weights, displacement, scatter } = readings;
     let mut mechanism = Mechanism::new(arm);
     let count = mechanism.joint_count();
     for (row, measurement) in measurements.iter().enumerate() {
@@ -253,7 +257,7 @@ fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], bases: usize) 
         let coarse = step < 8;
         let mut jacobian = DMatrix::zeros(equations, width);
         let mut residual = DVector::zeros(equations);
-        let mut whitening = DVector::zeros(equations);
+        let mut diagonal = DVector::zeros(equations);
         let (mut postures, mut targets) = (Vec::new(), Vec::new());
         let root_from_measurement: Vec<Pose> = measurement_from_root.iter().map(Pose::inverse).collect();
         for (row, measurement) in measurements.iter().enumerate() {
@@ -267,7 +271,7 @@ fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], bases: usize) 
             let (position, turn) = sigmas(sensor, &measurement.position().coords);
             let weight = libm::sqrt(weights[row]);
             for equation in 0..per_row {
-                whitening[first + equation] = weight / if equation < 3 { position } else { turn };
+                diagonal[first + equation] = weight / if equation < 3 { position } else { turn };
             }
             if let (true, Some(measured)) = (attitude, measurement.attitude()) {
                 let tool = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(posture.tool_axes));
@@ -309,8 +313,12 @@ fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], bases: usize) 
             postures.push(posture);
             targets.push(target);
         }
-        let whitened = scaled(&jacobian, &whitening);
-        let errors = residual.component_mul(&whitening);
+        let mut whitening = Whitening::new(diagonal, per_row);
+        if !scatter.is_empty() {
+            whitening = whitening.with(&scatter::displaced(&mechanism, &postures, &targets, per_row, scatter));
+        }
+        let whitened = whitening.of(&jacobian);
+        let errors = whitening.of_vector(&residual);
         // The prior pulls the frames' errors to zero, and base and target to where they are.
         let pull = DVector::from_fn(width, |column, _| if free[column] { 0.0 } else { -parameters[column] });
         let cost = errors.norm_squared() + pull.norm_squared();
@@ -391,13 +399,4 @@ fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], bases: usize) 
         }
     }
     unreachable!("the loop ends by returning")
-}
-
-/// `matrix` with each row times its weight.
-pub(super) fn scaled(matrix: &DMatrix<f64>, weights: &DVector<f64>) -> DMatrix<f64> {
-    let mut result = matrix.clone();
-    for mut column in result.column_iter_mut() {
-        column.component_mul_assign(weights);
-    }
-    result
 }

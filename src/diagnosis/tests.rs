@@ -154,6 +154,21 @@ fn a_fault_that_has_no_name_is_unknown() {
 }
 
 #[test]
+fn a_joint_that_does_not_repeat_is_no_ripple() {
+    // Backlash whose side nobody recorded.
+    let (arm, mut rows) =
+        readings("test/scatter", |_, _, approach, joint, _| if joint == 3 { 2e-4 * f64::from(approach[3]) } else { 0.0 });
+    for row in &mut rows {
+        row.approach.clear();
+    }
+    let found = diagnosed(&arm, &rows, Vec::new());
+    assert_eq!(found.verdict, Verdict::UnknownRemains, "{}", found.sentence);
+    let place = found.unknown.r#where.unwrap_or_default();
+    assert!(found.effects.is_empty() && place.starts_with("joint 4 does not repeat"), "{}", found.sentence);
+    assert!(found.next_measurements.iter().any(|advice| advice.contains("joint 4")), "{:?}", found.next_measurements);
+}
+
+#[test]
 fn too_few_readings_are_refused_and_swapped_joints_are_said() {
     let (arm, mut rows) = readings("test/bad", |_, _, _, _, _| 0.0);
     let options = Options::new(NoiseSource::Declared);

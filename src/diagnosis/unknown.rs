@@ -19,10 +19,12 @@ pub(super) fn unknown(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFl
     let known = !matches!(noise_floor.source, NoiseSource::Assumed);
     let over = noise_floor.position_m / mean_sigma(analysis.sensor, analysis.measurements);
     let excess = known && level > EXCESS * over * over;
-    let present = of_nameless >= NAMED || structured || excess;
+    let scatters = !analysis.scatter.is_empty();
+    let present = of_nameless >= NAMED || structured || excess || scatters;
     let r#where = present.then(|| {
         let members = analysis.found.best.members.iter().map(|(hypothesis, _)| &analysis.candidates.hypotheses[*hypothesis]);
         let mut said: Vec<String> = members.filter(|of| of.kind.is_none()).map(|of| of.detail.clone()).collect();
+        said.extend(analysis.scatter.iter().map(|one| one.detail(analysis.rows.mechanism.slides[one.joint])));
         if structured {
             said.push(analysis.structure.r#where.clone());
         }

@@ -47,7 +47,7 @@ impl<'a> Waterfall<'a> {
         let total = measurements.len();
         let groups = groups(measurements);
         let start = vec![1.0; total];
-        let rows = rows::fit(arm, Readings { sensor, measurements, weights: &start, displacement: &[] })?;
+        let rows = rows::fit(arm, Readings { sensor, measurements, weights: &start, displacement: &[], scatter: &[] })?;
         let conditions = conditions::conditions(measurements, &rows);
         let scheme = held_out::schemes(measurements, &rows.targets, &groups).swap_remove(0);
         let good = vec![true; total];
@@ -55,7 +55,7 @@ impl<'a> Waterfall<'a> {
         for _ in 0..PASSES {
             let displacement = waterfall.all(effects);
             let weights = &waterfall.weights;
-            let rows = rows::fit(arm, Readings { sensor, measurements, weights, displacement: &displacement })?;
+            let rows = rows::fit(arm, Readings { sensor, measurements, weights, displacement: &displacement, scatter: &[] })?;
             let weighed = weights::weigh(&rows, &rows.residual, weights, &groups);
             let outliers = outliers::look(&weighed.squares, rows.per_row).rows;
             waterfall.good = (0..total).map(|row| !outliers.contains(&row)).collect();
@@ -112,8 +112,10 @@ impl<'a> Waterfall<'a> {
                 // What weighs nothing has no part in the fit, and its residual is the prediction's error.
                 let weights: Vec<f64> =
                     (0..measurements.len()).map(|row| if held(&row) { 0.0 } else { self.weights[row] }).collect();
-                let fitted =
-                    rows::fit(self.arm, Readings { sensor, measurements, weights: &weights, displacement: displacements })?;
+                let fitted = rows::fit(
+                    self.arm,
+                    Readings { sensor, measurements, weights: &weights, displacement: displacements, scatter: &[] },
+                )?;
                 let counted: Vec<usize> = (0..measurements.len()).filter(|row| held(row) && self.good[*row]).collect();
                 let square = |row: &usize| fitted.residual.fixed_rows::<3>(row * fitted.per_row).norm_squared();
                 Ok((counted.iter().map(square).sum::<f64>(), counted.len()))

@@ -21,9 +21,9 @@ pub(super) struct Weighed {
 /// Weighs the rows by what a model leaves of them (`residual`, m and rad). `before`: the weights that are in `rows.whitening`.
 pub(super) fn weigh(rows: &Rows, residual: &DVector<f64>, before: &[f64], groups: &Groups) -> Weighed {
     // In declared sigmas, whatever a row's weight.
-    let sigmas: Vec<f64> = (0..residual.len())
-        .map(|equation| residual[equation] * rows.whitening[equation] / libm::sqrt(before[equation / rows.per_row]))
-        .collect();
+    let whitened = rows.whitening.of_vector(residual);
+    let sigmas: Vec<f64> =
+        whitened.iter().enumerate().map(|(equation, value)| value / libm::sqrt(before[equation / rows.per_row])).collect();
     let squares: Vec<f64> = sigmas.chunks(rows.per_row).map(|row| row.iter().map(|value| value * value).sum::<f64>()).collect();
     let far = outliers::weights(&squares, rows.per_row);
     let near: Vec<bool> = far.iter().map(|weight| *weight > 0.5).collect();

@@ -42,7 +42,7 @@ fn every_signature_is_what_physics_makes() {
     let rows: Vec<_> = measurements.iter().collect();
     let fitted = fit(
         &scene.arm,
-        Readings { sensor: &scene.sensor, measurements: &rows, weights: &vec![1.0; rows.len()], displacement: &[] },
+        Readings { sensor: &scene.sensor, measurements: &rows, weights: &vec![1.0; rows.len()], displacement: &[], scatter: &[] },
     )
     .unwrap();
     let known = conditions(&rows, &fitted);
