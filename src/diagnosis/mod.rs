@@ -95,6 +95,48 @@ impl Options {
     }
 }
 
+/// What a pass of the diagnosis is made around.
+#[derive(Clone)]
+struct Around {
+    /// Weight of each row for being far off.
+    far: Vec<f64>,
+    /// Weight of each row for being like others of its configuration.
+    dependent: Vec<f64>,
+    /// What the effects found so far do.
+    displacement: Vec<Displacement>,
+    /// The best set so far, sorted.
+    members: Vec<(usize, usize)>,
+    /// Ripples that scans have added to the library.
+    ripples: Vec<Ripple>,
+    /// Joints that do not repeat.
+    scatter: Vec<Scatter>,
+}
+
+impl Around {
+    /// Nothing found, all of `rows` rows good.
+    fn nominal(rows: usize) -> Around {
+        Around {
+            far: vec![1.0; rows],
+            dependent: vec![1.0; rows],
+            displacement: Vec::new(),
+            members: Vec::new(),
+            ripples: Vec::new(),
+            scatter: Vec::new(),
+        }
+    }
+
+    /// Around what a pass found.
+    fn next(self, weighed: weights::Weighed, displacement: Vec<Displacement>, members: Vec<(usize, usize)>) -> Around {
+        Around { far: weighed.far, dependent: weighed.dependent, displacement, members, ..self }
+    }
+
+    /// Whether a pass found what it was made around.
+    fn is_settled(&self, weighed: &weights::Weighed, members: &[(usize, usize)]) -> bool {
+        let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-2);
+        same(&weighed.far, &self.far) && same(&weighed.dependent, &self.dependent) && *members == self.members
+    }
+}
+
 /// What was found, before it is put into words.
 pub(crate) struct Analysis<'a> {
     pub(crate) rows: &'a Rows,
@@ -134,24 +176,19 @@ pub fn diagnose(
     let groups = groups::groups(measurements);
     let repeats = groups::repeats(measurements, &groups);
     let noise = noise_prior(repeats, mean_sigma(sensor, measurements), options.noise);
-    let mut dependent = vec![1.0; total];
-    let mut far = vec![1.0; total];
-    let mut displacement: Vec<Displacement> = Vec::new();
-    let mut before = Vec::new();
-    let mut ripples: Vec<Ripple> = Vec::new();
-    let mut scatter: Vec<Scatter> = Vec::new();
+    let mut around = Around::nominal(total);
     let (mut last, mut looks) = (PASSES - 1, 0);
     let mut plain = None;
     // Around the arm as it is with the effects found so far, until nothing changes: signatures are those of the fitted arm, readings
     // that are far off from the best model or that repeat others are weighted down, and geometry and effects are fitted together.
     for pass in 0.. {
-        let weights: Vec<f64> = dependent.iter().zip(&far).map(|(a, b)| a * b).collect();
-        let rows =
-            rows::fit(arm, Readings { sensor, measurements, weights: &weights, displacement: &displacement, scatter: &scatter })?;
+        let weights: Vec<f64> = around.dependent.iter().zip(&around.far).map(|(a, b)| a * b).collect();
+        let (displacement, scatter) = (&around.displacement, &around.scatter);
+        let rows = rows::fit(arm, Readings { sensor, measurements, weights: &weights, displacement, scatter })?;
         let conditions = conditions::conditions(measurements, &rows);
-        let hypotheses = options.hypotheses(&rows, &conditions, &ripples);
+        let hypotheses = options.hypotheses(&rows, &conditions, &around.ripples);
         let (mut raw, mut candidates) = matrix(&rows, &conditions, hypotheses);
-        put_back(&mut raw, &rows, &displacement);
+        put_back(&mut raw, &rows, displacement);
         let problem = Problem::new(&rows, raw);
         let schemes = held_out::schemes(measurements, &rows.targets, &groups);
         let grams = problem.grams(&schemes[0]);
@@ -166,10 +203,9 @@ pub fn diagnose(
         let coefficients = evidence::coefficients(&surviving, &candidates, noise, &found.best.members);
         let residual = problem.left(&surviving, &coefficients);
         let weighed = weights::weigh(&rows, &residual, &weights, &groups);
-        let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-2);
         let mut members: Vec<(usize, usize)> = found.best.members.clone();
         members.sort_unstable();
-        let settled = same(&weighed.far, &far) && same(&weighed.dependent, &dependent) && members == before;
+        let settled = around.is_settled(&weighed, &members);
         let more = if pass < last {
             let level = evidence::noise_level(&surviving, &candidates, noise, &found.best.members);
             ripple::scan(&problem, &conditions.readings, &residual, level, &candidates)
@@ -177,9 +213,9 @@ pub fn diagnose(
             Vec::new()
         };
         if pass < last && (!settled || !more.is_empty()) {
-            ripples.extend(more);
-            displacement = displaced(&problem, &rows, &coefficients);
-            (far, dependent, before) = (weighed.far, weighed.dependent, members);
+            let displacement = displaced(&problem, &rows, &coefficients);
+            around = around.next(weighed, displacement, members);
+            around.ripples.extend(more);
             continue;
         }
         let mut outliers = outliers::look(&weighed.squares, rows.per_row);
@@ -196,28 +232,24 @@ pub fn diagnose(
         let validate =
             |good: &[bool]| held_out::cross_validate(&problem, &schemes[0], good, &grams, &candidates, noise, search::MOST);
         // Then, whether a joint does not repeat: its errors are no evidence of anything else.
-        let scattered =
-            if looks < LOOKS { scatter::look(&rows, &problem, &surviving, &candidates, noise, &found) } else { scatter.clone() };
-        if scattered != scatter {
-            if let (true, None) = (scatter.is_empty(), &plain) {
-                let left = validate(&good).explained();
-                let state = (far.clone(), dependent.clone(), displacement.clone(), ripples.clone(), before.clone());
-                plain = Some((left, good, state));
+        let may_scatter = looks < LOOKS;
+        let looked = may_scatter.then(|| scatter::look(&rows, &problem, &surviving, &candidates, noise, &found));
+        if let Some(scatter) = looked.filter(|scatter| *scatter != around.scatter) {
+            if around.scatter.is_empty() && plain.is_none() {
+                plain = Some((validate(&good).explained(), good, around.clone()));
             }
-            displacement = displaced(&problem, &rows, &coefficients);
-            (far, dependent, before) = (weighed.far, weighed.dependent, members);
-            scatter = scattered;
+            let displacement = displaced(&problem, &rows, &coefficients);
+            around = Around { scatter, ..around.next(weighed, displacement, members) };
             (last, looks) = (pass + PASSES, looks + 1);
             continue;
         }
-        // Scatter has no order: where readings that were not used are predicted worse with it, there was an order that it took the place of.
-        if let (false, Some((left, good, state))) = (scatter.is_empty(), plain.take()) {
-            if validate(&good).explained() > WORSE * WORSE * left {
-                (far, dependent, displacement, ripples, before) = state;
-                scatter.clear();
-                (last, looks) = (pass + 1, LOOKS);
-                continue;
-            }
+        // Scatter has no order: where readings that were not used are predicted worse with it, it took the place of one that there is.
+        if let Some((left, good, without)) = plain.take_if(|_| !around.scatter.is_empty())
+            && validate(&good).explained() > WORSE * WORSE * left
+        {
+            around = without;
+            (last, looks) = (pass + 1, LOOKS);
+            continue;
         }
         let held_out: Vec<held_out::HeldOut> = schemes
             .iter()
@@ -245,7 +277,7 @@ pub fn diagnose(
             held_out,
             structure,
             outliers,
-            scatter,
+            scatter: around.scatter,
             maps,
             residuals,
             moved,

@@ -15,10 +15,14 @@ pub(super) fn sentence(
     power: &Detectability,
 ) -> String {
     let list = |effects: &[Effect]| {
-        let names: Vec<String> = effects
-            .iter()
-            .map(|effect| format!("{} ({:.0} %)", of_place(&effect.kind, &effect.location), 100.0 * effect.probability))
-            .collect();
+        // Two ripples of one joint are one cause.
+        let mut names: Vec<String> = Vec::new();
+        for effect in effects {
+            let name = format!("{} ({:.0} %)", of_place(&effect.kind, &effect.location), 100.0 * effect.probability);
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
         names.join(", ")
     };
     let um = |metres: f64| format!("{:.0} µm", metres * 1e6);

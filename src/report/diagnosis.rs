@@ -215,12 +215,14 @@ fn picture(map: &Map) -> String {
 fn blind(diagnosis: &Diagnosis) -> String {
     let mut kinds: Vec<(&str, Vec<String>)> = Vec::new();
     for one in &diagnosis.undetectable {
-        let index = one.location.index.map(|index| index.to_string()).unwrap_or_default();
+        let whole = if one.location.level == Level::Link { "whole arm" } else { "" };
+        let index = one.location.index.map_or_else(|| whole.to_owned(), |index| index.to_string());
         match kinds.iter_mut().find(|(kind, _)| *kind == one.kind) {
             Some((_, places)) => places.push(index),
             None => kinds.push((&one.kind, vec![index])),
         }
     }
-    let said: Vec<String> = kinds.iter().map(|(kind, places)| format!("{kind} {}", places.join(",")).trim().to_owned()).collect();
+    let said: Vec<String> =
+        kinds.iter().map(|(kind, places)| format!("{kind} {}", places.join(", ")).trim().to_owned()).collect();
     said.join("; ")
 }
