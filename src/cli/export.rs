@@ -8,7 +8,7 @@ use super::arguments::{ExportOptions, Format, Global};
 use super::input::{input_stem, is_recording};
 use super::output;
 use crate::kinematics::urdf;
-use crate::measurement::{Measurement, table};
+use crate::measurement::{Measurement, Sensor, table};
 use crate::recording::event::Event;
 use crate::{recording, scene, session};
 
@@ -67,7 +67,8 @@ fn from_recording(global: &Global, options: &ExportOptions) -> anyhow::Result<(&
             if measured.is_empty() {
                 bail!("{} holds no measurements", path.display());
             }
-            Ok(("csv", table::write(&measured)?))
+            let noise = if start.scene.is_empty() { String::new() } else { noise_options(&scene()?.scene.sensor, &measured) };
+            Ok(("csv", noise + &table::write(&measured)?))
         }
         Format::Urdf => {
             let identified = recording.events.iter().rev().find_map(|event| match event {
@@ -94,4 +95,12 @@ fn from_recording(global: &Global, options: &ExportOptions) -> anyhow::Result<(&
             Ok(("urdf", text))
         }
     }
+}
+
+/// A comment that says how exact the readings are, for the table has no column for that.
+fn noise_options(sensor: &Sensor, measured: &[Measurement]) -> String {
+    let sigma = measured.iter().map(|row| sensor.position_sigma_at(&row.position().coords)).sum::<f64>() / measured.len() as f64;
+    let attitude =
+        sensor.attitude_sigma_rad.map(|sigma| format!(" --attitude-noise-deg {:.5}", sigma.to_degrees())).unwrap_or_default();
+    format!("# one sigma per axis, for identify and diagnose: --position-noise-um {:.2}{attitude}\n", sigma * 1e6)
 }

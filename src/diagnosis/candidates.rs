@@ -108,10 +108,9 @@ pub(super) fn weigh(candidates: &mut Candidates, surviving: &Surviving) {
     candidates.log_odds = log_odds;
 }
 
-/// Logarithm of the prior odds that one joint does what no hypothesis of `candidates` says: a class more of shapes without a name.
-pub(super) fn odds_of_one_more_nameless(candidates: &Candidates) -> f64 {
+/// Logarithm of the prior odds that one of `joints` joints does what no hypothesis of `candidates` says: a class more of shapes without a name.
+pub(super) fn odds_of_one_more_nameless(candidates: &Candidates, joints: usize) -> f64 {
     let nameless = candidates.hypotheses.iter().zip(&candidates.active).filter(|(of, active)| **active && of.kind.is_none());
     let classes: BTreeSet<u8> = nameless.map(|(of, _)| class(of).1).collect();
-    let joints = candidates.hypotheses.iter().filter_map(|of| of.location.index).max().unwrap_or(1);
     libm::log(ODDS * NAMELESS / ((classes.len() + 1) * joints) as f64)
 }

@@ -86,8 +86,14 @@ pub(super) fn confusion(analysis: &Analysis<'_>, named: &[Option<usize>]) -> Vec
                 })
                 .collect();
             if let Some(only) = said.first().cloned().filter(|_| alone) {
-                let detail = "something without a name that it stands in for".to_owned();
-                said.push(Candidate { kind: kind_name(None), probability: 1.0 - only.probability, detail, ..only });
+                let (unknown, detail) = if only.probability < SURE {
+                    (1.0 - only.probability, "something without a name that it stands in for")
+                } else {
+                    // Evidence is sure and held-out readings are not.
+                    said[0].probability = 0.5;
+                    (0.5, "something without a name: the other does not help on readings that were not used")
+                };
+                said.push(Candidate { kind: kind_name(None), probability: unknown, detail: detail.to_owned(), ..only });
             }
             said
         })

@@ -57,7 +57,10 @@ impl Problem {
             .into_par_iter()
             .map(|number| {
                 let of_fold: Vec<usize> = (0..scheme.fold.len()).filter(|row| scheme.fold[*row] == number).collect();
-                Gram::new(&self.whitening.of_rows(&self.raw, &of_fold), self.geometry)
+                let gram = Gram::new(&self.whitening.of_rows(&self.raw, &of_fold), self.geometry);
+                // A row that counts half is half an equation.
+                let weight: f64 = of_fold.iter().map(|row| self.whitening.weights()[*row]).sum();
+                Gram { equations: self.per_row as f64 * weight, ..gram }
             })
             .collect()
     }
@@ -124,10 +127,11 @@ pub struct HeldOut {
 }
 
 impl HeldOut {
-    /// Sum of the squares of all held-out positions with the effects that are used, m².
+    /// Mean square of the held-out positions with the effects that are used, m².
     #[must_use]
     pub fn explained(&self) -> f64 {
-        self.folds.iter().map(Fold::all).sum()
+        let rows: usize = self.folds.iter().map(|fold| fold.rows).sum();
+        self.folds.iter().map(Fold::all).sum::<f64>() / rows.max(1) as f64
     }
 }
 

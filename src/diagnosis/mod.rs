@@ -61,6 +61,8 @@ pub const FOLDS: usize = 5;
 const PASSES: usize = 5;
 /// Times that what was found is looked through for joints that do not repeat.
 const LOOKS: usize = 3;
+/// Degrees of freedom of what repeats without a move tell of the noise.
+const UNMOVED: f64 = 4.0;
 /// Held-out RMS with joints that do not repeat, over that without, from which on there are none.
 const WORSE: f64 = 1.03;
 
@@ -110,6 +112,8 @@ struct Around {
     ripples: Vec<Ripple>,
     /// Joints that do not repeat.
     scatter: Vec<Scatter>,
+    /// Noise of the attitudes over what is said of it, beside that of the positions.
+    attitude: f64,
 }
 
 impl Around {
@@ -122,6 +126,7 @@ impl Around {
             members: Vec::new(),
             ripples: Vec::new(),
             scatter: Vec::new(),
+            attitude: 1.0,
         }
     }
 
@@ -150,6 +155,8 @@ pub(crate) struct Analysis<'a> {
     pub(crate) outliers: outliers::Outliers,
     /// Joints that do not repeat.
     pub(crate) scatter: Vec<Scatter>,
+    /// Noise of the attitudes over what was said of it.
+    pub(crate) attitude: f64,
     pub(crate) maps: Vec<outcome::Map>,
     pub(crate) residuals: Vec<outcome::Residual>,
     /// Of each row, which member of the best set moves it most.
@@ -184,6 +191,8 @@ pub fn diagnose(
     for pass in 0.. {
         let weights: Vec<f64> = around.dependent.iter().zip(&around.far).map(|(a, b)| a * b).collect();
         let (displacement, scatter) = (&around.displacement, &around.scatter);
+        let attitude_sigma_rad = sensor.attitude_sigma_rad.map(|sigma| sigma * around.attitude);
+        let sensor = &Sensor { attitude_sigma_rad, ..sensor.clone() };
         let rows = rows::fit(arm, Readings { sensor, measurements, weights: &weights, displacement, scatter })?;
         let conditions = conditions::conditions(measurements, &rows);
         let hypotheses = options.hypotheses(&rows, &conditions, &around.ripples);
@@ -192,17 +201,15 @@ pub fn diagnose(
         let problem = Problem::new(&rows, raw);
         let schemes = held_out::schemes(measurements, &rows.targets, &groups);
         let grams = problem.grams(&schemes[0]);
-        let Some(mut surviving) = held_out::sum(&grams).surviving(&problem.offset) else {
+        let Some(surviving) = held_out::sum(&grams).surviving(&problem.offset) else {
             return Err(DiagnosisError::Degenerate);
         };
-        // A row that counts half is half an equation.
-        let lost = rows.per_row as f64 * weights.iter().map(|weight| 1.0 - weight).sum::<f64>();
-        surviving.freedom = (surviving.freedom - lost).max(1.0);
         weigh(&mut candidates, &surviving);
         let found = search::search(&surviving, &candidates, noise, search::MOST);
         let coefficients = evidence::coefficients(&surviving, &candidates, noise, &found.best.members);
         let residual = problem.left(&surviving, &coefficients);
         let weighed = weights::weigh(&rows, &residual, &weights, &groups);
+        let ratio = weights::attitude_over_position(&rows, &residual).filter(|_| pass < last && scatter.is_empty());
         let mut members: Vec<(usize, usize)> = found.best.members.clone();
         members.sort_unstable();
         let settled = around.is_settled(&weighed, &members);
@@ -212,10 +219,11 @@ pub fn diagnose(
         } else {
             Vec::new()
         };
-        if pass < last && (!settled || !more.is_empty()) {
+        if pass < last && (!settled || !more.is_empty() || ratio.is_some()) {
             let displacement = displaced(&problem, &rows, &coefficients);
             around = around.next(weighed, displacement, members);
             around.ripples.extend(more);
+            around.attitude *= ratio.unwrap_or(1.0);
             continue;
         }
         let mut outliers = outliers::look(&weighed.squares, rows.per_row);
@@ -229,14 +237,20 @@ pub fn diagnose(
             outliers = outliers::Outliers { rows: far_off, ..outliers::look(&sure, rows.per_row) };
         }
         let good: Vec<bool> = (0..total).map(|row| !outliers.rows.contains(&row)).collect();
-        let validate =
-            |good: &[bool]| held_out::cross_validate(&problem, &schemes[0], good, &grams, &candidates, noise, search::MOST);
+        let validate = |scheme: &held_out::Scheme, good: &[bool]| {
+            let own = (scheme.by != Block::Region).then(|| problem.grams(scheme));
+            let grams = own.as_ref().unwrap_or(&grams);
+            held_out::cross_validate(&problem, scheme, good, grams, &candidates, noise, search::MOST)
+        };
         // Then, whether a joint does not repeat: its errors are no evidence of anything else.
-        let may_scatter = looks < LOOKS;
-        let looked = may_scatter.then(|| scatter::look(&rows, &problem, &surviving, &candidates, noise, &found));
-        if let Some(scatter) = looked.filter(|scatter| *scatter != around.scatter) {
+        let may_scatter = looks < LOOKS && options.only.is_none();
+        // Repeats between which the arm moved have the scatter in them.
+        let of_sensor = NoisePrior { freedom: noise.freedom.min(UNMOVED), ..noise };
+        let looked = may_scatter
+            .then(|| scatter::look(&rows, &problem, &surviving, &candidates, of_sensor, &found, !around.scatter.is_empty()));
+        if let Some(scatter) = looked.filter(|scatter| !scatter::alike(scatter, &around.scatter)) {
             if around.scatter.is_empty() && plain.is_none() {
-                plain = Some((validate(&good).explained(), good, around.clone()));
+                plain = Some((validate(&schemes[0], &good).explained(), good, around.clone()));
             }
             let displacement = displaced(&problem, &rows, &coefficients);
             around = Around { scatter, ..around.next(weighed, displacement, members) };
@@ -245,19 +259,13 @@ pub fn diagnose(
         }
         // Scatter has no order: where readings that were not used are predicted worse with it, it took the place of one that there is.
         if let Some((left, good, without)) = plain.take_if(|_| !around.scatter.is_empty())
-            && validate(&good).explained() > WORSE * WORSE * left
+            && validate(&schemes[0], &good).explained() > WORSE * WORSE * left
         {
             around = without;
             (last, looks) = (pass + 1, LOOKS);
             continue;
         }
-        let held_out: Vec<held_out::HeldOut> = schemes
-            .iter()
-            .map(|scheme| {
-                let grams = if scheme.by == Block::Region { grams.clone() } else { problem.grams(scheme) };
-                held_out::cross_validate(&problem, scheme, &good, &grams, &candidates, noise, search::MOST)
-            })
-            .collect();
+        let held_out: Vec<held_out::HeldOut> = schemes.iter().map(|scheme| validate(scheme, &good)).collect();
         let positions = |of: &DVector<f64>| -> Vec<Vector3<f64>> {
             (0..total).map(|row| Vector3::from(of.fixed_rows::<3>(row * rows.per_row))).collect()
         };
@@ -278,6 +286,7 @@ pub fn diagnose(
             structure,
             outliers,
             scatter: around.scatter,
+            attitude: around.attitude,
             maps,
             residuals,
             moved,
@@ -337,7 +346,7 @@ fn noise_prior(repeats: Option<Repeats>, declared_m: f64, source: NoiseSource) -
         (Some(repeats), _) => {
             let level = (repeats.position_m / declared_m) * (repeats.position_m / declared_m);
             // Without a move between them they say little about the arm.
-            NoisePrior { freedom: repeats.freedom.min(if repeats.moved { 20.0 } else { 4.0 }), level }
+            NoisePrior { freedom: repeats.freedom.min(if repeats.moved { 20.0 } else { UNMOVED }), level }
         }
         (None, NoiseSource::Assumed) => NoisePrior { freedom: 1.0, level: 1.0 },
         (None, _) => NoisePrior { freedom: 10.0, level: 1.0 },

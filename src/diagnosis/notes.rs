@@ -1,15 +1,19 @@
 //! What was assumed, switched off, thinned out or left out.
 
 use super::held_out::{Block, HeldOut};
-use super::outcome::NoiseSource;
+use super::outcome::{Gap, NoiseFloor};
 use super::sentence::whose;
+use nalgebra::Vector3;
+
 use super::{Analysis, mean_sigma};
+use crate::effects::signature::posture::Posture;
 
 /// Mean squares of the residual, over the declared one, that are nothing to speak of.
 const USUAL: std::ops::RangeInclusive<f64> = 0.44..=2.25;
 
 /// All of it. `level`: mean square of the residual over the declared one.
-pub(super) fn notes(analysis: &Analysis<'_>, level: f64, source: NoiseSource) -> Vec<String> {
+pub(super) fn notes(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFloor, gap: &Gap) -> Vec<String> {
+    let source = noise_floor.source;
     let mut notes = analysis.conditions.notes.clone();
     notes.extend(analysis.rows.notes.iter().cloned());
     if analysis.repeats.is_some_and(|repeats| !repeats.moved) {
@@ -25,6 +29,32 @@ pub(super) fn notes(analysis: &Analysis<'_>, level: f64, source: NoiseSource) ->
         ));
     }
     notes.extend(analysis.held_out.iter().filter_map(doing_without));
+    if let Some(repeats) = analysis.repeats {
+        notes.push(format!(
+            "the noise is that of repeats: {:.0} differences between readings of one configuration that agree in all that was recorded \
+             (±{:.0} %)",
+            repeats.freedom / 3.0,
+            100.0 / libm::sqrt(2.0 * repeats.freedom)
+        ));
+    }
+    if let (true, Some(sigma)) = (analysis.attitude != 1.0, analysis.sensor.attitude_sigma_rad) {
+        notes.push(format!(
+            "attitudes are taken to be read to {:.4}°, not to {:.4}° as is said of them: so much is left of them beside what is left of the \
+             positions",
+            (sigma * libm::sqrt(level)).to_degrees(),
+            (sigma / analysis.attitude).to_degrees()
+        ));
+    }
+    let left = left_m(analysis);
+    if gap.explained_rms_m > FEW * left.max(gap.noise_rms_m) {
+        notes.push(format!(
+            "held-out errors ({:.0} µm) are far above what is left of the readings that were used ({:.0} µm): {} readings are too few to \
+             tell this arm's geometry, and what is named rests on few",
+            gap.explained_rms_m * 1e6,
+            left * 1e6,
+            analysis.measurements.len()
+        ));
+    }
     notes.extend(rounding(analysis));
     let outliers = &analysis.outliers;
     if !outliers.rows.is_empty() {
@@ -35,11 +65,17 @@ pub(super) fn notes(analysis: &Analysis<'_>, level: f64, source: NoiseSource) ->
             .push(format!("readings far off, weighted down and not counted in held-out errors: rows {}{more}", names.join(", ")));
     }
     if !USUAL.contains(&level) {
-        notes.push(format!("the residuals are {:.2} times the {} noise", libm::sqrt(level), whose(source)));
+        let joints: Vec<String> = analysis.scatter.iter().map(|one| (one.joint + 1).to_string()).collect();
+        let beside =
+            if joints.is_empty() { String::new() } else { format!(" (beside the scatter of joint {})", joints.join(" and ")) };
+        let large = if level < 1.0 { ": it is said to be larger than it is, and hides what is there" } else { "" };
+        notes.push(format!("the residuals are {:.2} times the {} noise{beside}{large}", libm::sqrt(level), whose(source)));
     }
     notes
 }
 
+/// Held-out RMS over what is left of the readings used, from which on the readings are too few.
+const FEW: f64 = 4.0;
 /// Steps to which joint readings are written, with the unit, rad.
 const STEPS: [(f64, &str); 8] = [
     (std::f64::consts::PI / 180.0, "1°"),
@@ -54,29 +90,55 @@ const STEPS: [(f64, &str); 8] = [
 /// Error by rounding over the sensor's from which on it is worth a word.
 const ROUNDED: f64 = 0.3;
 
-/// Whether the joint readings were rounded so much that it shows.
-fn rounding(analysis: &Analysis<'_>) -> Option<String> {
+/// RMS of what is left of the readings, m.
+fn left_m(analysis: &Analysis<'_>) -> f64 {
+    let square: f64 = analysis.residuals.iter().flat_map(|row| row.after_m).map(|value| value * value).sum();
+    (square / analysis.residuals.len().max(1) as f64).sqrt()
+}
+
+/// Joints whose readings were rounded so much that it shows.
+fn rounding(analysis: &Analysis<'_>) -> Vec<String> {
     let rows = analysis.rows;
-    let turns = |joint: &usize| !rows.mechanism.slides[*joint];
-    let joints: Vec<usize> = (0..rows.mechanism.joint_count()).filter(turns).collect();
-    let values = || analysis.measurements.iter().flat_map(|row| joints.iter().map(|joint| row.joints[*joint]));
-    let on = |step: f64| values().all(|value| (value / step - (value / step).round()).abs() < 1e-6);
-    let (step, name) = STEPS.into_iter().find(|(step, _)| on(*step))?;
-    let mut square = 0.0;
-    for (posture, target) in rows.postures.iter().zip(&rows.targets) {
-        for joint in &joints {
-            square += posture.axes[*joint].cross(&(target - posture.origins[*joint])).norm_squared();
+    let sensor_m = 3_f64.sqrt() * mean_sigma(analysis.sensor, analysis.measurements);
+    // By step: the joints and the square of the error that they make, m².
+    let mut found: Vec<(&str, Vec<String>, f64)> = Vec::new();
+    for joint in (0..rows.mechanism.joint_count()).filter(|joint| !rows.mechanism.slides[*joint]) {
+        let values: Vec<f64> = analysis.measurements.iter().map(|row| row.joints[joint]).collect();
+        let on = |step: f64| values.iter().all(|value| (value / step - (value / step).round()).abs() < 1e-6);
+        // A joint that stands still is on any step.
+        let Some((step, name)) = STEPS.into_iter().find(|(step, _)| on(*step) && values.iter().any(|value| *value != values[0]))
+        else {
+            continue;
+        };
+        let moved = |(posture, target): (&Posture, &Vector3<f64>)| -> f64 {
+            posture.moved(joint, false, target)[..3].iter().map(|value| value * value).sum()
+        };
+        let square = rows.postures.iter().zip(&rows.targets).map(moved).sum::<f64>() / rows.postures.len() as f64;
+        let square = square * step * step / 12.0;
+        match found.iter_mut().find(|(known, _, _)| *known == name) {
+            Some((_, joints, sum)) => {
+                joints.push((joint + 1).to_string());
+                *sum += square;
+            }
+            None => found.push((name, vec![(joint + 1).to_string()], square)),
         }
     }
-    let error_m = step / 12_f64.sqrt() * (square / rows.postures.len() as f64).sqrt();
-    let sensor_m = 3_f64.sqrt() * mean_sigma(analysis.sensor, analysis.measurements);
-    (error_m > ROUNDED * sensor_m).then(|| {
-        format!(
-            "joint readings are rounded to {name}: if the arm stood anywhere within that, this alone is an error of {:.0} µm RMS, which \
-             may look like joints that do not repeat; write them out in full (what was commanded and reached exactly is no error)",
-            error_m * 1e6
-        )
-    })
+    let before: f64 = analysis.residuals.iter().flat_map(|row| row.before_m).map(|value| value * value).sum();
+    let before_m = (before / analysis.residuals.len().max(1) as f64).sqrt();
+    // Where less is left, the arm stood where the rounded readings say.
+    let shows = |square: f64| square.sqrt() > ROUNDED * sensor_m && square.sqrt() < 1.5 * before_m;
+    found
+        .into_iter()
+        .filter(|(_, _, square)| shows(*square))
+        .map(|(step, joints, square)| {
+            format!(
+                "readings of joint {} are rounded to {step}: where the arm stood anywhere within that, this alone is an error of {:.0} µm \
+                 RMS, which may look like joints that do not repeat or like ripple; write them out in full",
+                joints.join(", "),
+                square.sqrt() * 1e6
+            )
+        })
+        .collect()
 }
 
 /// How many folds do without something that evidence chose for them.

@@ -257,7 +257,7 @@ fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], bases: usize) 
         let coarse = step < 8;
         let mut jacobian = DMatrix::zeros(equations, width);
         let mut residual = DVector::zeros(equations);
-        let mut diagonal = DVector::zeros(equations);
+        let mut inverse_sigmas = DVector::zeros(equations);
         let (mut postures, mut targets) = (Vec::new(), Vec::new());
         let root_from_measurement: Vec<Pose> = measurement_from_root.iter().map(Pose::inverse).collect();
         for (row, measurement) in measurements.iter().enumerate() {
@@ -269,9 +269,8 @@ fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], bases: usize) 
             let measured = (root_from_measurement * measurement.position()).coords;
             residual.fixed_rows_mut::<3>(first).copy_from(&(measured - target - Vector3::new(x, y, z)));
             let (position, turn) = sigmas(sensor, &measurement.position().coords);
-            let weight = libm::sqrt(weights[row]);
             for equation in 0..per_row {
-                diagonal[first + equation] = weight / if equation < 3 { position } else { turn };
+                inverse_sigmas[first + equation] = 1.0 / if equation < 3 { position } else { turn };
             }
             if let (true, Some(measured)) = (attitude, measurement.attitude()) {
                 let tool = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(posture.tool_axes));
@@ -313,7 +312,7 @@ fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], bases: usize) 
             postures.push(posture);
             targets.push(target);
         }
-        let mut whitening = Whitening::new(diagonal, per_row);
+        let mut whitening = Whitening::new(inverse_sigmas, weights);
         if !scatter.is_empty() {
             whitening = whitening.with(&scatter::displaced(&mechanism, &postures, &targets, per_row, scatter));
         }

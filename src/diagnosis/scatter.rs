@@ -3,7 +3,7 @@
 //! is compared with none, by marginal likelihood, and with the ripples and bumps that such scatter is mistaken for: among thousands of
 //! shapes one follows any scatter somewhat.
 
-use nalgebra::{DVector, Matrix3, Vector3};
+use nalgebra::{DVector, DVectorView, Matrix3, Vector3};
 
 use super::candidates::odds_of_one_more_nameless;
 use super::evidence::{Candidates, NoisePrior, coefficients, log_posterior};
@@ -31,16 +31,26 @@ const ALONG: f64 = 3.5;
 pub struct Scatter {
     /// The joint, from 0.
     pub joint: usize,
-    /// One sigma of its error, rad or (where it slides) m.
+    /// One sigma of its error beside a sensor that is as good as declared, rad or (where it slides) m; where the noise is larger, so is
+    /// this.
     pub sigma: f64,
+    /// Logarithm of the odds of it against the sensor alone.
+    pub log_odds: f64,
 }
 
 impl Scatter {
-    /// In words.
-    pub(super) fn detail(&self, slides: bool) -> String {
-        let (size, unit) = if slides { (self.sigma * 1e6, "µm") } else { (self.sigma.to_degrees() * 3600.0, "arcsec") };
+    /// In words. `level`: mean square of the noise over the declared one.
+    pub(super) fn detail(&self, level: f64, slides: bool) -> String {
+        let sigma = self.sigma * libm::sqrt(level);
+        let (size, unit) = if slides { (sigma * 1e6, "µm") } else { (sigma.to_degrees() * 3600.0, "arcsec") };
         format!("joint {} does not repeat: its errors scatter by {size:.0} {unit}, in no order that was recorded", self.joint + 1)
     }
+}
+
+/// Whether both are the same joints, their sigmas the same within a step.
+pub(super) fn alike(one: &[Scatter], other: &[Scatter]) -> bool {
+    let near = |a: &Scatter, b: &Scatter| a.joint == b.joint && (0.7..1.5).contains(&(a.sigma / b.sigma));
+    one.len() == other.len() && one.iter().all(|a| other.iter().any(|b| near(a, b)))
 }
 
 /// What one sigma of each of `scatter` does to the target (at `targets`, in root, m) of each row: m and, of 6 equations, rad.
@@ -59,13 +69,11 @@ pub(super) fn displaced(
 
 /// What a unit move of `joint` does to `target`, m and rad.
 fn moved(mechanism: &Mechanism, posture: &Posture, target: &Vector3<f64>, per_row: usize, joint: usize) -> DVector<f64> {
-    let axis = posture.axes[joint];
-    let (shift, turn) =
-        if mechanism.slides[joint] { (axis, Vector3::zeros()) } else { (axis.cross(&(target - posture.origins[joint])), axis) };
-    DVector::from_iterator(per_row, shift.iter().chain(turn.iter()).take(per_row).copied())
+    DVector::from_row_slice(&posture.moved(joint, mechanism.slides[joint], target)[..per_row])
 }
 
-/// The joints that scatter, given what was found, most likely first.
+/// The joints that scatter, given what was found, most likely first. `known`: some do already in what makes the equations alike, so that
+/// ripples and bumps that are there are there beside it.
 pub(super) fn look(
     rows: &Rows,
     problem: &Problem,
@@ -73,6 +81,7 @@ pub(super) fn look(
     candidates: &Candidates,
     noise: NoisePrior,
     found: &Found,
+    known: bool,
 ) -> Vec<Scatter> {
     let all = &found.best.members;
     let contested = |(member, _): &&(usize, usize)| {
@@ -82,23 +91,30 @@ pub(super) fn look(
             || matches!(of.shape, Shape::Bump { .. })
     };
     let fewer: Vec<(usize, usize)> = all.iter().filter(|member| !contested(member)).copied().collect();
-    // What ripples and bumps are worth, beside the scatter that is in the noise already.
+    // What ripples and bumps are worth where the noise is the sensor's.
     let worth = log_posterior(surviving, candidates, noise, all) - log_posterior(surviving, candidates, noise, &fewer);
-    let odds = odds_of_one_more_nameless(candidates);
+    let odds = odds_of_one_more_nameless(candidates, rows.mechanism.joint_count());
     let left = |members: &[(usize, usize)]| problem.left(surviving, &coefficients(surviving, candidates, noise, members));
-    let trials = if fewer.len() < all.len() { vec![(left(all), 0.0), (left(&fewer), worth)] } else { vec![(left(all), 0.0)] };
+    let mut trials = vec![(left(all), 0.0)];
+    if fewer.len() < all.len() && !known {
+        trials.push((left(&fewer), worth));
+    }
     let mut best: (f64, Vec<Scatter>) = (0.0, Vec::new());
     for (residual, lost) in trials {
-        let position = Position::new(rows, problem, &residual);
+        let all = Left::new(rows, problem, &residual, rows.per_row);
+        // Attitudes may be less exact than they are said to be, which is no joint's doing.
+        let position = Left::new(rows, problem, &residual, 3);
         let mut scatter: Vec<Scatter> = Vec::new();
         let mut total = -lost;
         while scatter.len() < MOST {
             let tried = (0..rows.mechanism.joint_count()).filter(|joint| !scatter.iter().any(|one| one.joint == *joint));
-            let values = tried.map(|joint| position.value(surviving.freedom, noise, &scatter, joint));
+            let values = tried.map(|joint| all.value(surviving.freedom, noise, &scatter, joint));
             match values.max_by(|a, b| a.0.total_cmp(&b.0)) {
-                Some((gain, one)) if gain + odds > position.lopsided().max(0.0) && position.along(one.joint) > ALONG => {
+                Some((gain, one))
+                    if gain + odds > position.lopsided(&scatter).max(0.0) && position.along(&scatter, one.joint) > ALONG =>
+                {
                     total += gain + odds;
-                    scatter.push(one);
+                    scatter.push(Scatter { log_odds: gain + odds, ..one });
                 }
                 _ => break,
             }
@@ -110,58 +126,64 @@ pub(super) fn look(
     best.1
 }
 
-/// What is left of the positions: attitudes may be less exact than they are said to be, which is no joint's doing.
-struct Position<'a> {
+/// What is left of the readings, or of their first equations.
+struct Left<'a> {
     rows: &'a Rows,
-    /// One over sigma of each equation, as in [`Whitening::diagonal`].
-    diagonal: DVector<f64>,
-    /// m.
+    /// Sensor noise alone.
+    whitening: Whitening,
+    /// m, rad.
     residual: DVector<f64>,
+    /// Equations per row.
+    per_row: usize,
 }
 
-impl<'a> Position<'a> {
-    fn new(rows: &'a Rows, problem: &Problem, residual: &DVector<f64>) -> Position<'a> {
-        let of = |vector: &DVector<f64>| {
-            let first = |at: usize| vector[at / 3 * rows.per_row + at % 3];
-            DVector::from_fn(3 * rows.postures.len(), |at, _| first(at))
-        };
-        Position { rows, diagonal: of(&problem.whitening.diagonal), residual: of(residual) }
+impl<'a> Left<'a> {
+    /// The first `per_row` equations of each row.
+    fn new(rows: &'a Rows, problem: &Problem, residual: &DVector<f64>, per_row: usize) -> Left<'a> {
+        let first = |at: usize| residual[at / per_row * rows.per_row + at % per_row];
+        let residual = DVector::from_fn(per_row * rows.postures.len(), |at, _| first(at));
+        Left { rows, whitening: problem.whitening.of_sensor(per_row), residual, per_row }
     }
 
-    /// What a unit move of `joint` does in `row`, m.
-    fn moved(&self, row: usize, joint: usize) -> DVector<f64> {
-        moved(&self.rows.mechanism, &self.rows.postures[row], &self.rows.targets[row], 3, joint)
+    /// What makes the equations alike beside the scatter of `others`.
+    fn beside(&self, others: &[Scatter]) -> Whitening {
+        let rows = self.rows;
+        if others.is_empty() {
+            return self.whitening.clone();
+        }
+        self.whitening.clone().with(&displaced(&rows.mechanism, &rows.postures, &rows.targets, self.per_row, others))
+    }
+
+    /// Of each row: its weight, the residual and what a unit move of `joint` does, both in sigmas beside `others`.
+    fn in_sigmas(&self, others: &[Scatter], joint: usize) -> Vec<(f64, DVector<f64>, DVector<f64>)> {
+        let (rows, base) = (self.rows, self.beside(others));
+        (0..rows.postures.len())
+            .map(|row| {
+                let weight = base.weights()[row].max(1e-300);
+                let count = self.per_row;
+                let moved = moved(&rows.mechanism, &rows.postures[row], &rows.targets[row], count, joint);
+                let of = |values: DVectorView<'_, f64>| base.of_row(row, values) / libm::sqrt(weight);
+                (weight, of(self.residual.rows(count * row, count)), of(moved.rows(0, count)))
+            })
+            .collect()
     }
 
     /// Logarithm of the marginal likelihood of the residual with a scatter of `joint` besides `others` over that without, the noise's
-    /// level integrated out and the sigma averaged over; and the best sigma. `freedom`: equations that the model leaves.
+    /// level integrated out, the geometry as fitted, and the sigma averaged over; and the best sigma. `freedom`: equations that the
+    /// model leaves. A row counts by its weight.
     fn value(&self, freedom: f64, noise: NoisePrior, others: &[Scatter], joint: usize) -> (f64, Scatter) {
-        let rows = self.rows;
-        let mut base = Whitening::new(self.diagonal.clone(), 3);
-        if !others.is_empty() {
-            base = base.with(&displaced(&rows.mechanism, &rows.postures, &rows.targets, 3, others));
-        }
-        let whitened = base.of_vector(&self.residual);
-        let square = whitened.norm_squared();
-        let moved: Vec<(f64, f64)> = (0..rows.postures.len())
-            .map(|row| {
-                let moved = self.moved(row, joint);
-                let moved = base.of_row(row, moved.rows(0, 3));
-                (moved.norm_squared(), moved.dot(&whitened.rows(3 * row, 3)))
-            })
-            .collect();
-        let degrees = noise.freedom + freedom * 3.0 / rows.per_row as f64;
+        let rows = self.in_sigmas(others, joint);
+        let square: f64 = rows.iter().map(|(weight, left, _)| weight * left.norm_squared()).sum();
+        let degrees = noise.freedom + freedom * self.per_row as f64 / self.rows.per_row as f64;
         let known = noise.freedom * noise.level;
-        let level = (known + square) / degrees;
         let values: Vec<(f64, f64)> = (0..STEPS)
             .map(|step| {
                 let sigma = SMALLEST * libm::pow(2.0, 0.5 * f64::from(step));
-                // Over the noise's level, so that both are of one scale.
-                let ratio = sigma * sigma / level;
                 let (mut drop, mut volume) = (0.0, 0.0);
-                for (own, with) in &moved {
-                    drop += ratio * with * with / (1.0 + ratio * own);
-                    volume += libm::log(1.0 + ratio * own);
+                for (weight, left, moved) in &rows {
+                    let (own, with) = (sigma * sigma * moved.norm_squared(), sigma * moved.dot(left));
+                    drop += weight * with * with / (1.0 + own);
+                    volume += weight * libm::log(1.0 + own);
                 }
                 let left = ((known + square - drop) / (known + square)).max(1e-12);
                 (-0.5 * volume - 0.5 * degrees * libm::log(left), sigma)
@@ -170,40 +192,37 @@ impl<'a> Position<'a> {
         let top = values.iter().map(|(value, _)| *value).fold(f64::NEG_INFINITY, f64::max);
         let mean = values.iter().map(|(value, _)| libm::exp(value - top)).sum::<f64>() / f64::from(STEPS);
         let sigma = values.iter().find(|(value, _)| *value == top).map_or(SMALLEST, |(_, sigma)| *sigma);
-        (top + libm::log(mean), Scatter { joint, sigma })
+        (top + libm::log(mean), Scatter { joint, sigma, log_odds: 0.0 })
     }
 
-    /// The residual of `row` in sigmas.
-    fn sigmas(&self, row: usize) -> Vector3<f64> {
-        Vector3::from(self.residual.fixed_rows::<3>(3 * row)).component_mul(&self.diagonal.fixed_rows::<3>(3 * row))
-    }
-
-    /// What the same residual gains, in the same terms, by a sensor whose noise has another size along every axis (Schwarz's
+    /// What the positions beside `others` gain, in the same terms, by a sensor whose noise has another size along every axis (Schwarz's
     /// criterion): a tracker is better along its beam than across it.
-    fn lopsided(&self) -> f64 {
-        let count = self.rows.postures.len() as f64;
+    fn lopsided(&self, others: &[Scatter]) -> f64 {
+        let base = self.beside(others);
+        let whitened = base.of_vector(&self.residual);
+        let count: f64 = base.weights().iter().sum();
         let square = |row: usize| {
-            let in_frame = self.rows.measurement_from_root[self.rows.session[row]].rotation * self.sigmas(row);
+            let left = Vector3::from(whitened.fixed_rows::<3>(self.per_row * row));
+            let in_frame = self.rows.measurement_from_root[self.rows.session[row]].rotation * left;
             in_frame * in_frame.transpose() / count
         };
         let covariance: Matrix3<f64> = (0..self.rows.postures.len()).map(square).sum();
-        let round = libm::pow(covariance.trace() / 3.0, 3.0);
+        let round = libm::pow(covariance.trace() / 3.0, 3.0).max(1e-300);
         0.5 * count * libm::log(round / covariance.determinant().max(1e-12 * round)) - 2.5 * libm::log(count)
     }
 
-    /// By how many standard deviations the residuals point along the motion of `joint` rather than anywhere, whatever their size: some
-    /// readings that are far off are no scatter (a sign test in space).
-    fn along(&self, joint: usize) -> f64 {
-        let cosines: Vec<f64> = (0..self.rows.postures.len())
-            .filter_map(|row| {
-                let moved = self.moved(row, joint);
-                let (left, moved) = (self.sigmas(row), Vector3::from(moved.fixed_rows::<3>(0)));
-                let size = left.norm_squared() * moved.norm_squared();
-                (size > 0.0).then(|| left.dot(&moved) * left.dot(&moved) / size)
-            })
-            .collect();
-        // The square of a cosine to a random direction is 1/3 in the mean, with the variance 4/45.
-        let count = cosines.len() as f64;
-        (cosines.iter().sum::<f64>() - count / 3.0) / libm::sqrt(count * 4.0 / 45.0).max(1e-12)
+    /// By how many standard deviations the positions beside `others` point along the motion of `joint` rather than anywhere, whatever
+    /// their size: some readings that are far off are no scatter (a sign test in space). Readings that are alike count once.
+    fn along(&self, others: &[Scatter], joint: usize) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (weight, left, moved) in self.in_sigmas(others, joint) {
+            let size = left.norm_squared() * moved.norm_squared();
+            if size > 0.0 {
+                // The square of a cosine to a random direction is 1/3 in the mean, with the variance 4/45.
+                sum += weight * (left.dot(&moved) * left.dot(&moved) / size - 1.0 / 3.0);
+                count += weight;
+            }
+        }
+        sum / libm::sqrt(count * 4.0 / 45.0).max(1e-12)
     }
 }

@@ -14,7 +14,7 @@ pub(super) fn sentence(
     gap: &Gap,
     power: &Detectability,
 ) -> String {
-    let list = |effects: &[Effect]| {
+    let names = |effects: &[Effect]| {
         // Two ripples of one joint are one cause.
         let mut names: Vec<String> = Vec::new();
         for effect in effects {
@@ -23,8 +23,9 @@ pub(super) fn sentence(
                 names.push(name);
             }
         }
-        names.join(", ")
+        names
     };
+    let list = |effects: &[Effect]| names(effects).join(", ");
     let um = |metres: f64| format!("{:.0} µm", metres * 1e6);
     match verdict {
         Verdict::NoGap => format!(
@@ -52,7 +53,7 @@ pub(super) fn sentence(
                 .take(3)
                 .map(|one| format!("{} ({:.0} %)", of_place(&one.kind, &one.location), 100.0 * one.probability))
                 .collect();
-            if effects.len() > 1 {
+            if names(effects).len() > 1 {
                 format!(
                     "Several causes, not all settled (below {:.0} %): {}; held-out RMS {} with geometry, {} with the causes.",
                     100.0 * SURE,

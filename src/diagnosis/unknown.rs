@@ -24,7 +24,7 @@ pub(super) fn unknown(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFl
     let r#where = present.then(|| {
         let members = analysis.found.best.members.iter().map(|(hypothesis, _)| &analysis.candidates.hypotheses[*hypothesis]);
         let mut said: Vec<String> = members.filter(|of| of.kind.is_none()).map(|of| of.detail.clone()).collect();
-        said.extend(analysis.scatter.iter().map(|one| one.detail(analysis.rows.mechanism.slides[one.joint])));
+        said.extend(analysis.scatter.iter().map(|one| one.detail(level, analysis.rows.mechanism.slides[one.joint])));
         if structured {
             said.push(analysis.structure.r#where.clone());
         }
@@ -33,5 +33,6 @@ pub(super) fn unknown(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFl
         }
         said.join("; ")
     });
-    Unknown { present, p_value: p_value.min(1.0 - of_nameless).max(0.0), r#where }
+    let of_scatter = analysis.scatter.iter().map(|one| 1.0 / (1.0 + libm::exp(one.log_odds))).fold(1.0, f64::min);
+    Unknown { present, p_value: p_value.min(1.0 - of_nameless).min(of_scatter).max(0.0), r#where }
 }

@@ -28,6 +28,7 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
     let named = name(analysis, &closing, unknown.present);
     let confusion_sets = confusion(analysis, &named.of_member);
     let power = detectability(analysis, level);
+    let notes = notes(analysis, level, &noise_floor, &gap);
     let verdict = decide(&unknown, &named.effects, &confusion_sets, power.share);
     Diagnosis {
         verdict,
@@ -36,7 +37,7 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
         unknown,
         maps: analysis.maps.clone(),
         next_measurements: next(analysis, &confusion_sets, &power, verdict),
-        notes: notes(analysis, level, noise_floor.source),
+        notes,
         readings: analysis.measurements.len(),
         residuals: residuals(analysis, &named.of_member),
         noise_floor,
@@ -53,7 +54,9 @@ fn noise_floor(analysis: &Analysis<'_>) -> NoiseFloor {
         Some(repeats) => (repeats.position_m, NoiseSource::Repeats),
         None => (mean_sigma(analysis.sensor, analysis.measurements), analysis.options.noise),
     };
-    let rotation_rad = analysis.sensor.attitude_sigma_rad.filter(|_| analysis.rows.per_row == 6);
+    // In the same proportion to that of the positions as what is left of them.
+    let proportion = position_m / mean_sigma(analysis.sensor, analysis.measurements);
+    let rotation_rad = analysis.sensor.attitude_sigma_rad.filter(|_| analysis.rows.per_row == 6).map(|sigma| sigma * proportion);
     NoiseFloor { position_m, rotation_rad, source }
 }
 
@@ -63,7 +66,8 @@ fn decide(unknown: &Unknown, effects: &[Effect], sets: &[Vec<Candidate>], share:
     let open = sets.iter().any(|set| set.iter().map(|candidate| candidate.probability).sum::<f64>() >= NAMED);
     if unknown.present {
         Verdict::UnknownRemains
-    } else if !named.is_empty() && named.iter().all(|effect| effect.probability >= SURE) {
+    } else if !named.is_empty() && named.iter().all(|effect| effect.probability >= SURE && 2 * effect.folds[0] >= effect.folds[1])
+    {
         Verdict::Explained
     } else if !named.is_empty() || open {
         Verdict::Ambiguous

@@ -30,3 +30,33 @@ pub(super) fn weigh(rows: &Rows, residual: &DVector<f64>, before: &[f64], groups
     let (dependent, correlation) = groups::weights(groups, &sigmas, rows.per_row, &near);
     Weighed { squares, far, dependent, correlation }
 }
+
+/// Medians of squares over one sigma's, of three equations.
+const MEDIAN: f64 = 2.366;
+/// Beyond chance, a difference of the logarithms of the sigmas that matters.
+const MATTERS: f64 = 0.1;
+
+/// How much larger than that of the positions what is left of the attitudes is, both in the sensor's sigmas, if that is neither chance
+/// nor next to nothing: one of them is not what it is said to be (estimation of variance components, Helmert 1907, here by medians).
+pub(super) fn attitude_over_position(rows: &Rows, residual: &DVector<f64>) -> Option<f64> {
+    if rows.per_row != 6 {
+        return None;
+    }
+    let whitened = rows.whitening.of_vector(residual);
+    let counts: Vec<usize> = (0..rows.postures.len()).filter(|row| rows.whitening.weights()[*row] > 0.3).collect();
+    let level = |first: usize| {
+        let square = |row: &usize| whitened.rows(6 * row + first, 3).norm_squared() / rows.whitening.weights()[*row];
+        let mut squares: Vec<f64> = counts.iter().map(square).collect();
+        squares.sort_by(f64::total_cmp);
+        squares.get(squares.len() / 2).map_or(0.0, |middle| middle / MEDIAN)
+    };
+    let (position, attitude) = (level(0), level(3));
+    if position <= 0.0 || attitude <= 0.0 {
+        return None;
+    }
+    let log = 0.5 * libm::log(attitude / position);
+    // A median of squares of three equations tells sigma as well as three fifths of the readings would; rows that count less, less.
+    let readings: f64 = counts.iter().map(|row| rows.whitening.weights()[*row]).sum();
+    let deviation = libm::sqrt(2.0 / (6.0 * 0.6 * readings));
+    (log.abs() > MATTERS + 3.0 * deviation).then(|| libm::exp(log))
+}

@@ -264,7 +264,7 @@ fn answer(steps: &[Step]) -> (Answer, String) {
     }
     let worst = steps.iter().filter_map(|step| step.difference_rms_m).fold(0.0, f64::max);
     let sentence = format!(
-        "The physics confirms it: held-out RMS is {} µm with what the physics does taken away, {} µm with the formulas of first order; \
+        "The physics does what the formulas say (which does not prove the names): held-out RMS is {} µm with what the physics does taken away, {} µm with the formulas of first order; \
          both move the target alike to {} µm RMS.{besides}",
         um(last.physics_rms_m),
         um(last.analytic_rms_m),

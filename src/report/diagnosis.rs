@@ -9,7 +9,7 @@ use crate::effects::Level;
 #[must_use]
 pub fn text(diagnosis: &Diagnosis) -> String {
     let mut text = answer(diagnosis);
-    text.push_str("\nWhat remains along each joint's motion, over its travel (each step two standard errors):\n");
+    text.push_str("\nWhat remains along each joint's motion, over its travel in eight parts, low to high\n(△ ▲ one way, ▽ ▼ the other, by three and by six standard errors; · by less):\n");
     for map in &diagnosis.maps {
         text.push_str(&format!("  joint {:<2} {}\n", map.joint, picture(map)));
     }
@@ -45,9 +45,14 @@ pub fn answer(diagnosis: &Diagnosis) -> String {
     }
     if diagnosis.unknown.present {
         let place = diagnosis.unknown.r#where.clone().unwrap_or_default();
-        text.push_str(&format!("\nUnknown: {place} (p = {}).\n", number(diagnosis.unknown.p_value)));
+        text.push_str(&format!("\nUnknown: {place} ({}).\n", p(diagnosis.unknown.p_value)));
     }
     text
+}
+
+/// A p-value in words.
+fn p(value: f64) -> String {
+    if value < 1e-12 { "p < 1e-12".to_owned() } else { format!("p = {}", number(value)) }
 }
 
 fn um(metres: f64) -> String {

@@ -128,7 +128,7 @@ fn what_is_named_is_confirmed_by_the_physics() {
     let json = ran.json();
     agrees(&json, json["gap"]["noise_rms_m"].as_f64().unwrap());
     let report = kincal(folder.path(), &["diagnose", &recording, "--confirm"]).ends(0).stdout;
-    assert!(report.contains("The physics confirms it") && report.contains("+ backlash joint 3"), "{report}");
+    assert!(report.contains("The physics does what the formulas say") && report.contains("+ backlash joint 3"), "{report}");
 
     kincal(folder.path(), &["export", &recording, "--to", "csv"]).ends(0);
     kincal(folder.path(), &["export", scene, "--to", "urdf"]).ends(0);

@@ -151,6 +151,14 @@ impl Posture {
         GRAVITY_SIGMA * self.forces[joint].norm()
     }
 
+    /// What a unit move of `joint`, which slides or turns, does to `target` (in root): shift (m) and turn (rad).
+    #[must_use]
+    pub fn moved(&self, joint: usize, slides: bool, target: &Vector3<f64>) -> [f64; 6] {
+        let axis = self.axes[joint];
+        let (shift, turn) = if slides { (axis, Vector3::zeros()) } else { (axis.cross(&(target - self.origins[joint])), axis) };
+        [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z]
+    }
+
     /// Torque about the axis of `joint`, N·m.
     #[must_use]
     pub fn torque(&self, joint: usize) -> f64 {

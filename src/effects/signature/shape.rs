@@ -212,8 +212,7 @@ impl Reading {
     /// The joint moves by `amount`.
     #[must_use]
     pub fn moved(&self, joint: usize, amount: f64) -> Displacement {
-        let axis = self.posture.axes[joint] * amount;
-        if self.slides[joint] { twist(axis, Vector3::zeros()) } else { self.turned(joint, axis) }
+        self.posture.moved(joint, self.slides[joint], &self.target).map(|value| value * amount)
     }
 
     /// Everything from the origin of `joint` on turns by the rotation vector `turn`.
