@@ -3,6 +3,7 @@
 use super::Analysis;
 use super::claims::{Claim, NAMED, SURE, claim, kind_name, place, rivals};
 use super::outcome::Candidate;
+use crate::effects::Kind;
 
 /// A hypothesis of a set has at least this probability.
 const WORTH_SAYING: f64 = 0.03;
@@ -86,14 +87,16 @@ pub(super) fn confusion(analysis: &Analysis<'_>, named: &[Option<usize>]) -> Vec
                 })
                 .collect();
             if let Some(only) = said.first().cloned().filter(|_| alone) {
-                let (unknown, detail) = if only.probability < SURE {
-                    (1.0 - only.probability, "something without a name that it stands in for")
-                } else {
-                    // Evidence is sure and held-out readings are not.
-                    said[0].probability = 0.5;
+                // Where evidence is sure, and it is not named all the same, that is because held-out readings are not helped (a ripple), or
+                // because something unknown is there beside it.
+                let (most, detail) = if only.kind == Kind::StrainWaveError.name() {
                     (0.5, "something without a name: the other does not help on readings that were not used")
+                } else {
+                    (SURE, "something without a name that it stands in for")
                 };
-                said.push(Candidate { kind: kind_name(None), probability: unknown, detail: detail.to_owned(), ..only });
+                said[0].probability = only.probability.min(most);
+                let probability = 1.0 - said[0].probability;
+                said.push(Candidate { kind: kind_name(None), probability, detail: detail.to_owned(), ..only });
             }
             said
         })

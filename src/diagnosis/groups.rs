@@ -1,9 +1,10 @@
 //! Readings that are not independent: several targets of one pose, repeats without a move, and the same configuration read again.
 //! What geometry and effects leave there is the arm's, once, and the sensor's, each time.
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use super::conditions::centre;
+use crate::frames::rotation_vector;
 use crate::measurement::Measurement;
 
 /// Joint readings that differ by less are of one configuration, rad or m: commanded values come back rounded, or as encoders see them.
@@ -32,6 +33,8 @@ pub struct Groups {
 pub struct Repeats {
     /// One sigma per axis, m.
     pub position_m: f64,
+    /// One sigma of an attitude about an axis, rad, where attitudes were read.
+    pub attitude_rad: Option<f64>,
     /// Degrees of freedom.
     pub freedom: f64,
     /// Whether the arm moved between the readings: if not, they show the sensor alone.
@@ -124,6 +127,7 @@ pub fn repeats(measurements: &[&Measurement], groups: &Groups) -> Option<Repeats
             && a.temperatures_c.iter().zip(&b.temperatures_c).all(|(a, b)| near(Some(*a), Some(*b)))
     };
     let (mut of_visits, mut between) = (Vec::new(), Vec::new());
+    let (mut turns_of_visits, mut turns_between) = (Vec::new(), Vec::new());
     for rows in &groups.rows {
         let mut left = rows.clone();
         left.sort_by_key(|row| place[*row]);
@@ -143,16 +147,25 @@ pub fn repeats(measurements: &[&Measurement], groups: &Groups) -> Option<Repeats
                     None => visits.push(vec![row]),
                 }
             }
-            let point = |row: &usize| measurements[*row].position().coords;
+            let points = |rows: &[usize]| rows.iter().map(|row| measurements[*row].position().coords).collect::<Vec<_>>();
+            // From the attitude of the first.
+            let turns = |rows: &[usize]| -> Vec<Vector3<f64>> {
+                let attitudes: Option<Vec<UnitQuaternion<f64>>> = rows.iter().map(|row| measurements[*row].attitude()).collect();
+                let attitudes = attitudes.unwrap_or_default();
+                attitudes.iter().map(|attitude| rotation_vector(&(attitudes[0].inverse() * attitude))).collect()
+            };
             for visit in &visits {
-                of_visits.extend(contrasts(&visit.iter().map(point).collect::<Vec<_>>()));
+                of_visits.extend(contrasts(&points(visit)));
+                turns_of_visits.extend(contrasts(&turns(visit)));
             }
             // One reading of each visit, so that the sensor's noise is there once.
-            let firsts: Vec<Vector3<f64>> = visits.iter().filter_map(|visit| visit.first().map(point)).collect();
-            between.extend(contrasts(&firsts));
+            let firsts: Vec<usize> = visits.iter().filter_map(|visit| visit.first().copied()).collect();
+            between.extend(contrasts(&points(&firsts)));
+            turns_between.extend(contrasts(&turns(&firsts)));
         }
     }
-    let noise = |squares: &[f64], moved: bool| {
+    // One sigma and its degrees of freedom.
+    let sigma = |squares: &[f64]| {
         if squares.len() < CONTRASTS {
             return None;
         }
@@ -162,9 +175,13 @@ pub fn repeats(measurements: &[&Measurement], groups: &Groups) -> Option<Repeats
         let good: Vec<f64> = sorted.into_iter().filter(|square| *square <= RARE * level).collect();
         let freedom = 3.0 * good.len() as f64;
         let mean = good.iter().sum::<f64>() / freedom;
-        (mean > 0.0).then(|| Repeats { position_m: libm::sqrt(mean), freedom, moved })
+        (mean > 0.0).then(|| (libm::sqrt(mean), freedom))
     };
-    noise(&between, true).or_else(|| noise(&of_visits, false))
+    let noise = |squares: &[f64], turns: &[f64], moved: bool| {
+        let (position_m, freedom) = sigma(squares)?;
+        Some(Repeats { position_m, attitude_rad: sigma(turns).map(|(sigma, _)| sigma), freedom, moved })
+    };
+    noise(&between, &turns_between, true).or_else(|| noise(&of_visits, &turns_of_visits, false))
 }
 
 /// Squares of orthonormal contrasts (Helmert's) of readings of the same point: each is χ² with three degrees of freedom times the
@@ -226,6 +243,8 @@ mod tests {
         for index in 0..400 {
             let mut point = row(index, 0.01 * (index % 40) as f64 + 1e-5 * stream.normal(), 0.0);
             point.position_m = [0, 1, 2].map(|_| 20e-6 * stream.normal());
+            let turn = Vector3::from_fn(|_, _| 5e-5 * stream.normal());
+            point.attitude_xyzw = Some(UnitQuaternion::from_scaled_axis(turn).coords.into());
             // A few are two millimetres off, as in a real file.
             if index % 100 == 7 {
                 point.position_m[0] += 2e-3;
@@ -238,6 +257,7 @@ mod tests {
         let found = repeats(&rows, &groups).unwrap();
         assert!(found.moved && (found.position_m / 20e-6 - 1.0).abs() < 0.05, "{found:?}");
         assert!(found.freedom > 950.0);
+        assert!((found.attitude_rad.unwrap() / 5e-5 - 1.0).abs() < 0.05, "{found:?}");
     }
 
     #[test]

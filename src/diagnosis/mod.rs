@@ -63,6 +63,8 @@ const PASSES: usize = 5;
 const LOOKS: usize = 3;
 /// Degrees of freedom of what repeats without a move tell of the noise.
 const UNMOVED: f64 = 4.0;
+/// Correlation of what is left of readings of one configuration from which on it is the configuration's.
+const ALIKE: f64 = 0.5;
 /// Held-out RMS with joints that do not repeat, over that without, from which on there are none.
 const WORSE: f64 = 1.03;
 
@@ -183,7 +185,8 @@ pub fn diagnose(
     let groups = groups::groups(measurements);
     let repeats = groups::repeats(measurements, &groups);
     let noise = noise_prior(repeats, mean_sigma(sensor, measurements), options.noise);
-    let mut around = Around::nominal(total);
+    let by_repeats = weights::attitude_of_repeats(sensor, repeats, mean_sigma(sensor, measurements));
+    let mut around = Around { attitude: by_repeats.unwrap_or(1.0), ..Around::nominal(total) };
     let (mut last, mut looks) = (PASSES - 1, 0);
     let mut plain = None;
     // Around the arm as it is with the effects found so far, until nothing changes: signatures are those of the fitted arm, readings
@@ -209,7 +212,8 @@ pub fn diagnose(
         let coefficients = evidence::coefficients(&surviving, &candidates, noise, &found.best.members);
         let residual = problem.left(&surviving, &coefficients);
         let weighed = weights::weigh(&rows, &residual, &weights, &groups);
-        let ratio = weights::attitude_over_position(&rows, &residual).filter(|_| pass < last && scatter.is_empty());
+        let may_tell = pass < last && scatter.is_empty() && by_repeats.is_none();
+        let ratio = weights::attitude_over_position(&rows, &residual).filter(|_| may_tell);
         let mut members: Vec<(usize, usize)> = found.best.members.clone();
         members.sort_unstable();
         let settled = around.is_settled(&weighed, &members);
@@ -243,7 +247,9 @@ pub fn diagnose(
             held_out::cross_validate(&problem, scheme, good, grams, &candidates, noise, search::MOST)
         };
         // Then, whether a joint does not repeat: its errors are no evidence of anything else.
-        let may_scatter = looks < LOOKS && options.only.is_none();
+        // An error that comes again with the configuration is no scatter.
+        let comes_again = repeats.is_some_and(|repeats| repeats.moved) && weighed.correlation > ALIKE;
+        let may_scatter = looks < LOOKS && options.only.is_none() && !comes_again;
         // Repeats between which the arm moved have the scatter in them.
         let of_sensor = NoisePrior { freedom: noise.freedom.min(UNMOVED), ..noise };
         let looked = may_scatter

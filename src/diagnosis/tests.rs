@@ -1,7 +1,7 @@
 //! The diagnosis of arms whose fault is known, made by other means than the signatures: joint angles that are off, with torques from
 //! the slope of the potential energy.
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, UnitQuaternion, Vector3};
 use serde_json::Value;
 
 use super::gram::Gram;
@@ -166,6 +166,34 @@ fn a_joint_that_does_not_repeat_is_no_ripple() {
     let place = found.unknown.r#where.unwrap_or_default();
     assert!(found.effects.is_empty() && place.starts_with("joint 4 does not repeat"), "{}", found.sentence);
     assert!(found.next_measurements.iter().any(|advice| advice.contains("joint 4")), "{:?}", found.next_measurements);
+}
+
+#[test]
+fn attitudes_that_are_better_than_said_are_no_effect() {
+    let (arm, mut rows) = readings("test/attitudes", |_, _, _, _, _| 0.0);
+    let mut stream = stream(6, "test/attitudes");
+    // The arm of the readings is that of their first draws.
+    let mut values = arm.chain.nominal();
+    let mut drawn = crate::seed::stream(5, "test/attitudes");
+    for (value, parameter) in values.iter_mut().zip(&arm.chain.parameters) {
+        let half = if parameter.quantity.unit() == "m" { 1e-3 } else { 3e-3 };
+        *value += drawn.uniform(-half, half);
+    }
+    let at = arm.chain.at(&values);
+    for row in &mut rows {
+        let noise = Vector3::from_fn(|_, _| 2e-5 * stream.normal());
+        let attitude = at.forward(&row.joints).rotation * UnitQuaternion::from_scaled_axis(noise);
+        row.attitude_xyzw = Some(attitude.coords.into());
+    }
+    let said = 9e-5;
+    let sensor = Sensor { attitude_sigma_rad: Some(said), ..sensor() };
+    let rows: Vec<&Measurement> = rows.iter().collect();
+    let options = Options { noise: NoiseSource::Declared, without: Vec::new(), only: None };
+    let found = diagnose(&arm, &sensor, &rows, &options).unwrap();
+    assert!(found.effects.is_empty() && !found.unknown.present, "{}", found.sentence);
+    let sigma = found.noise_floor.rotation_rad.unwrap();
+    assert!((sigma / 2e-5 - 1.0).abs() < 0.25, "{sigma}");
+    assert!(found.notes.iter().any(|note| note.contains("attitudes are taken to be read")), "{:?}", found.notes);
 }
 
 #[test]

@@ -2,9 +2,10 @@
 
 use nalgebra::DVector;
 
-use super::groups::{self, Groups};
+use super::groups::{self, Groups, Repeats};
 use super::outliers;
 use super::rows::Rows;
+use crate::measurement::Sensor;
 
 /// Weights of readings, and what they come from.
 pub(super) struct Weighed {
@@ -33,11 +34,26 @@ pub(super) fn weigh(rows: &Rows, residual: &DVector<f64>, before: &[f64], groups
 
 /// Medians of squares over one sigma's, of three equations.
 const MEDIAN: f64 = 2.366;
+/// Degrees of freedom of repeats from which on they tell the attitudes' noise.
+const ENOUGH: f64 = 36.0;
+/// Mean square, over what is said of the noise, beyond which what is left is no noise.
+const NO_NOISE: f64 = 9.0;
 /// Beyond chance, a difference of the logarithms of the sigmas that matters.
 const MATTERS: f64 = 0.1;
 
-/// How much larger than that of the positions what is left of the attitudes is, both in the sensor's sigmas, if that is neither chance
-/// nor next to nothing: one of them is not what it is said to be (estimation of variance components, Helmert 1907, here by medians).
+/// The noise of attitudes beside that of positions, over what is said of both; one where the difference is chance or next to nothing. None
+/// where there are not enough repeats.
+pub(super) fn attitude_of_repeats(sensor: &Sensor, repeats: Option<Repeats>, position_m: f64) -> Option<f64> {
+    let repeats = repeats.filter(|repeats| repeats.freedom >= ENOUGH)?;
+    let (found, said) = (repeats.attitude_rad? / repeats.position_m, sensor.attitude_sigma_rad? / position_m);
+    let log = libm::log(found / said);
+    let differs = log.abs() > MATTERS + 3.0 * libm::sqrt(1.0 / repeats.freedom);
+    (found > 0.0 && said > 0.0).then(|| if differs { libm::exp(log) } else { 1.0 })
+}
+
+/// How much larger than that of the positions what is left of the attitudes is, both in the sensor's sigmas, where that is neither chance
+/// nor next to nothing: one of them is not what it is said to be (estimation of variance components, Helmert 1907, here by medians). None
+/// where so much is left that it is not noise.
 pub(super) fn attitude_over_position(rows: &Rows, residual: &DVector<f64>) -> Option<f64> {
     if rows.per_row != 6 {
         return None;
@@ -51,7 +67,7 @@ pub(super) fn attitude_over_position(rows: &Rows, residual: &DVector<f64>) -> Op
         squares.get(squares.len() / 2).map_or(0.0, |middle| middle / MEDIAN)
     };
     let (position, attitude) = (level(0), level(3));
-    if position <= 0.0 || attitude <= 0.0 {
+    if position <= 0.0 || attitude <= 0.0 || position.min(attitude) > NO_NOISE {
         return None;
     }
     let log = 0.5 * libm::log(attitude / position);
