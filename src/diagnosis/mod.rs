@@ -213,7 +213,7 @@ pub fn diagnose(
         let residual = problem.left(&surviving, &coefficients);
         let weighed = weights::weigh(&rows, &residual, &weights, &groups);
         let may_tell = pass < last && scatter.is_empty() && by_repeats.is_none();
-        let ratio = weights::attitude_over_position(&rows, &residual).filter(|_| may_tell);
+        let ratio = weights::attitude_over_position(&rows, &residual, around.attitude != 1.0).filter(|_| may_tell);
         let mut members: Vec<(usize, usize)> = found.best.members.clone();
         members.sort_unstable();
         let settled = around.is_settled(&weighed, &members);

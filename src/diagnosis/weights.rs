@@ -53,8 +53,8 @@ pub(super) fn attitude_of_repeats(sensor: &Sensor, repeats: Option<Repeats>, pos
 
 /// How much larger than that of the positions what is left of the attitudes is, both in the sensor's sigmas, where that is neither chance
 /// nor next to nothing: one of them is not what it is said to be (estimation of variance components, Helmert 1907, here by medians). None
-/// where so much is left that it is not noise.
-pub(super) fn attitude_over_position(rows: &Rows, residual: &DVector<f64>) -> Option<f64> {
+/// where so much is left that it is not noise. `known`: that it is not as said is known already, and by how much is asked.
+pub(super) fn attitude_over_position(rows: &Rows, residual: &DVector<f64>, known: bool) -> Option<f64> {
     if rows.per_row != 6 {
         return None;
     }
@@ -73,6 +73,6 @@ pub(super) fn attitude_over_position(rows: &Rows, residual: &DVector<f64>) -> Op
     let log = 0.5 * libm::log(attitude / position);
     // A median of squares of three equations tells sigma as well as three fifths of the readings would; rows that count less, less.
     let readings: f64 = counts.iter().map(|row| rows.whitening.weights()[*row]).sum();
-    let deviation = libm::sqrt(2.0 / (6.0 * 0.6 * readings));
+    let deviation = if known { 0.0 } else { libm::sqrt(2.0 / (6.0 * 0.6 * readings)) };
     (log.abs() > MATTERS + 3.0 * deviation).then(|| libm::exp(log))
 }
