@@ -67,8 +67,10 @@ fn from_recording(global: &Global, options: &ExportOptions) -> anyhow::Result<(&
             if measured.is_empty() {
                 bail!("{} holds no measurements", path.display());
             }
-            let noise = if start.scene.is_empty() { String::new() } else { noise_options(&scene()?.scene.sensor, &measured) };
-            Ok(("csv", noise + &table::write(&measured)?))
+            if !start.scene.is_empty() {
+                output::note(global, &noise_options(&scene()?.scene.sensor, &measured));
+            }
+            Ok(("csv", table::write(&measured)?))
         }
         Format::Urdf => {
             let identified = recording.events.iter().rev().find_map(|event| match event {
@@ -97,10 +99,13 @@ fn from_recording(global: &Global, options: &ExportOptions) -> anyhow::Result<(&
     }
 }
 
-/// A comment that says how exact the readings are, for the table has no column for that.
+/// A note that says how exact the readings are, for the table has no column for that.
 fn noise_options(sensor: &Sensor, measured: &[Measurement]) -> String {
     let sigma = measured.iter().map(|row| sensor.position_sigma_at(&row.position().coords)).sum::<f64>() / measured.len() as f64;
     let attitude =
         sensor.attitude_sigma_rad.map(|sigma| format!(" --attitude-noise-deg {:.5}", sigma.to_degrees())).unwrap_or_default();
-    format!("# one sigma per axis, for identify and diagnose: --position-noise-um {:.2}{attitude}\n", sigma * 1e6)
+    format!(
+        "note: a table does not say how exact its readings are; for identify and diagnose: --position-noise-um {:.2}{attitude}",
+        sigma * 1e6
+    )
 }
