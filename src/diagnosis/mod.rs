@@ -64,7 +64,7 @@ const LOOKS: usize = 3;
 /// Degrees of freedom of what repeats without a move tell of the noise.
 const UNMOVED: f64 = 4.0;
 /// Correlation of what is left of readings of one configuration from which on it is the configuration's.
-const ALIKE: f64 = 0.5;
+const ALIKE: f64 = 0.9;
 /// Held-out RMS with joints that do not repeat, over that without, from which on there are none.
 const WORSE: f64 = 1.03;
 
@@ -256,7 +256,14 @@ pub fn diagnose(
             .then(|| scatter::look(&rows, &problem, &surviving, &candidates, of_sensor, &found, !around.scatter.is_empty()));
         if let Some(scatter) = looked.filter(|scatter| !scatter::alike(scatter, &around.scatter)) {
             if around.scatter.is_empty() && plain.is_none() {
-                plain = Some((validate(&schemes[0], &good).explained(), good, around.clone()));
+                // Ripples were chosen with the readings that a fold leaves out: they seem to help there.
+                let mut others = candidates.clone();
+                for (active, of) in others.active.iter_mut().zip(&others.hypotheses) {
+                    *active &= !scatter::is_contested(of);
+                }
+                let without =
+                    held_out::cross_validate(&problem, &schemes[0], &good, &grams, &others, noise, search::MOST).explained();
+                plain = Some((without, good, around.clone()));
             }
             let displacement = displaced(&problem, &rows, &coefficients);
             around = Around { scatter, ..around.next(weighed, displacement, members) };

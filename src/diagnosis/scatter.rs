@@ -13,7 +13,7 @@ use super::rows::Rows;
 use super::search::Found;
 use super::whitening::Whitening;
 use crate::effects::Kind;
-use crate::effects::signature::library::RIPPLES;
+use crate::effects::signature::library::{Hypothesis, RIPPLES};
 use crate::effects::signature::posture::{Mechanism, Posture};
 use crate::effects::signature::shape::Shape;
 
@@ -72,6 +72,13 @@ fn moved(mechanism: &Mechanism, posture: &Posture, target: &Vector3<f64>, per_ro
     DVector::from_row_slice(&posture.moved(joint, mechanism.slides[joint], target)[..per_row])
 }
 
+/// Whether scatter may be mistaken for it: one of thousands of ripples and bumps.
+pub(super) fn is_contested(of: &Hypothesis) -> bool {
+    of.kind == Some(Kind::StrainWaveError)
+        || matches!(of.shape, Shape::Harmonic(_, order) if order >= f64::from(*RIPPLES.start()))
+        || matches!(of.shape, Shape::Bump { .. })
+}
+
 /// The joints that scatter, given what was found, most likely first. `known`: some do already in what makes the equations alike, so that
 /// ripples and bumps that are there are there beside it.
 pub(super) fn look(
@@ -84,13 +91,8 @@ pub(super) fn look(
     known: bool,
 ) -> Vec<Scatter> {
     let all = &found.best.members;
-    let contested = |(member, _): &&(usize, usize)| {
-        let of = &candidates.hypotheses[*member];
-        of.kind == Some(Kind::StrainWaveError)
-            || matches!(of.shape, Shape::Harmonic(_, order) if order >= f64::from(*RIPPLES.start()))
-            || matches!(of.shape, Shape::Bump { .. })
-    };
-    let fewer: Vec<(usize, usize)> = all.iter().filter(|member| !contested(member)).copied().collect();
+    let fewer: Vec<(usize, usize)> =
+        all.iter().filter(|(member, _)| !is_contested(&candidates.hypotheses[*member])).copied().collect();
     // What ripples and bumps are worth where the noise is the sensor's.
     let worth = log_posterior(surviving, candidates, noise, all) - log_posterior(surviving, candidates, noise, &fewer);
     let odds = odds_of_one_more_nameless(candidates, rows.mechanism.joint_count());
