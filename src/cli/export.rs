@@ -101,7 +101,7 @@ fn from_recording(global: &Global, options: &ExportOptions) -> anyhow::Result<(&
 
 /// A note that says how exact the readings are, for the table has no column for that.
 fn noise_options(sensor: &Sensor, measured: &[Measurement]) -> String {
-    let sigma = measured.iter().map(|row| sensor.position_sigma_at(&row.position().coords)).sum::<f64>() / measured.len() as f64;
+    let sigma = sensor.mean_position_sigma(measured);
     let attitude =
         sensor.attitude_sigma_rad.map(|sigma| format!(" --attitude-noise-deg {:.5}", sigma.to_degrees())).unwrap_or_default();
     format!(

@@ -8,6 +8,9 @@ use crate::effects::Kind;
 /// A hypothesis of a set has at least this probability.
 const WORTH_SAYING: f64 = 0.03;
 
+/// Probability of a ripple of which evidence is sure and which held-out readings do not bear out: neither is believed more (a convention).
+const DIVIDED: f64 = 0.5;
+
 /// Sets of claims that the data cannot tell apart: each member of the best set that is not sure, with what may stand in its place.
 /// `named`: of each member of the best set, whether it is named; what is probable and not named stands here, be it alone.
 pub(super) fn confusion(analysis: &Analysis<'_>, named: &[Option<usize>]) -> Vec<Vec<Candidate>> {
@@ -90,7 +93,7 @@ pub(super) fn confusion(analysis: &Analysis<'_>, named: &[Option<usize>]) -> Vec
                 // Where evidence is sure, and it is not named all the same, that is because held-out readings are not helped (a ripple), or
                 // because something unknown is there beside it.
                 let (most, detail) = if only.kind == Kind::StrainWaveError.name() {
-                    (0.5, "something without a name: the other does not help on readings that were not used")
+                    (DIVIDED, "something without a name: the other does not help on readings that were not used")
                 } else {
                     (SURE, "something without a name that it stands in for")
                 };

@@ -4,6 +4,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::conditions::centre;
+use super::outliers::{MEDIAN, RARE};
 use crate::frames::rotation_vector;
 use crate::measurement::Measurement;
 
@@ -11,9 +12,6 @@ use crate::measurement::Measurement;
 const SAME: f64 = 2e-4;
 /// Temperatures that differ by less are the same, K.
 const SAME_TEMPERATURE: f64 = 0.5;
-/// Squares over one sigma's beyond which one reading in a thousand lies, and their median (χ² with three degrees of freedom).
-const RARE: f64 = 16.27;
-const MEDIAN: f64 = 2.366;
 /// Contrasts that a noise needs.
 const CONTRASTS: usize = 3;
 /// Pairs of alike readings from which their correlation is estimated rather than assumed.
@@ -171,8 +169,8 @@ pub fn repeats(measurements: &[&Measurement], groups: &Groups) -> Option<Repeats
         }
         let mut sorted = squares.to_vec();
         sorted.sort_by(f64::total_cmp);
-        let level = sorted[sorted.len() / 2] / MEDIAN;
-        let good: Vec<f64> = sorted.into_iter().filter(|square| *square <= RARE * level).collect();
+        let level = sorted[sorted.len() / 2] / MEDIAN[0];
+        let good: Vec<f64> = sorted.into_iter().filter(|square| *square <= RARE[0] * level).collect();
         let freedom = 3.0 * good.len() as f64;
         let mean = good.iter().sum::<f64>() / freedom;
         (mean > 0.0).then(|| (libm::sqrt(mean), freedom))

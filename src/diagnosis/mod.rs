@@ -171,6 +171,13 @@ pub(crate) struct Analysis<'a> {
     pub(crate) options: &'a Options,
 }
 
+impl Analysis<'_> {
+    /// One sigma of a position about an axis, as it is said of the sensor, m.
+    fn sigma_m(&self) -> f64 {
+        self.sensor.mean_position_sigma(self.measurements.iter().copied())
+    }
+}
+
 /// Diagnoses `measurements` of `arm`, read by `sensor`.
 ///
 /// # Errors
@@ -184,8 +191,9 @@ pub fn diagnose(
     let total = measurements.len();
     let groups = groups::groups(measurements);
     let repeats = groups::repeats(measurements, &groups);
-    let noise = noise_prior(repeats, mean_sigma(sensor, measurements), options.noise);
-    let by_repeats = weights::attitude_of_repeats(sensor, repeats, mean_sigma(sensor, measurements));
+    let sigma_m = sensor.mean_position_sigma(measurements.iter().copied());
+    let noise = noise_prior(repeats, sigma_m, options.noise);
+    let by_repeats = weights::attitude_of_repeats(sensor, repeats, sigma_m);
     let mut around = Around { attitude: by_repeats.unwrap_or(1.0), ..Around::nominal(total) };
     let (mut last, mut looks) = (PASSES - 1, 0);
     let mut plain = None;
@@ -246,8 +254,8 @@ pub fn diagnose(
             let grams = own.as_ref().unwrap_or(&grams);
             held_out::cross_validate(&problem, scheme, good, grams, &candidates, noise, search::MOST)
         };
-        // Then, whether a joint does not repeat: its errors are no evidence of anything else.
-        // An error that comes again with the configuration is no scatter.
+        // Then, whether a joint does not repeat: its errors are no evidence of anything else. An error that comes again with the
+        // configuration is no scatter.
         let comes_again = repeats.is_some_and(|repeats| repeats.moved) && weighed.correlation > ALIKE;
         let may_scatter = looks < LOOKS && options.only.is_none() && !comes_again;
         // Repeats between which the arm moved have the scatter in them.
@@ -335,7 +343,11 @@ impl Singles {
         let hypotheses = options.hypotheses(&rows, &conditions, &[]);
         let (raw, candidates) = matrix(&rows, &conditions, hypotheses);
         let groups = groups::groups(measurements);
-        let noise = noise_prior(groups::repeats(measurements, &groups), mean_sigma(sensor, measurements), options.noise);
+        let noise = noise_prior(
+            groups::repeats(measurements, &groups),
+            sensor.mean_position_sigma(measurements.iter().copied()),
+            options.noise,
+        );
         Ok(Singles { whitened: rows.whitening.of(&raw), problem: Problem::new(&rows, raw), candidates, noise })
     }
 
@@ -422,10 +434,4 @@ fn put_back(raw: &mut DMatrix<f64>, rows: &Rows, displacement: &[Displacement]) 
             raw[(row * rows.per_row + equation, last)] += displacement[equation];
         }
     }
-}
-
-/// Mean sigma of a position, m.
-fn mean_sigma(sensor: &Sensor, measurements: &[&Measurement]) -> f64 {
-    let sum: f64 = measurements.iter().map(|row| sensor.position_sigma_at(&row.position().coords)).sum();
-    (sum / measurements.len().max(1) as f64).max(1e-9)
 }

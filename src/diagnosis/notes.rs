@@ -1,11 +1,11 @@
 //! What was assumed, switched off, thinned out or left out.
 
-use super::held_out::{Block, HeldOut};
-use super::outcome::{Gap, NoiseFloor};
-use super::sentence::whose;
 use nalgebra::Vector3;
 
-use super::{Analysis, mean_sigma};
+use super::Analysis;
+use super::held_out::{Block, HeldOut};
+use super::outcome::{Gap, NoiseFloor, Residual};
+use super::sentence::whose;
 use crate::effects::signature::posture::Posture;
 
 /// Mean squares of the residual, over the declared one, that are nothing to speak of.
@@ -45,7 +45,7 @@ pub(super) fn notes(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFloo
             (sigma / analysis.attitude).to_degrees()
         ));
     }
-    let left = left_m(analysis);
+    let left = rms_m(analysis, |row| row.after_m);
     if gap.explained_rms_m > FEW * left.max(gap.noise_rms_m) {
         notes.push(format!(
             "held-out errors ({:.0} µm) are far above what is left of the readings that were used ({:.0} µm): {} readings are too few to \
@@ -90,16 +90,16 @@ const STEPS: [(f64, &str); 8] = [
 /// Error by rounding over the sensor's from which on it is worth a word.
 const ROUNDED: f64 = 0.3;
 
-/// RMS of what is left of the readings, m.
-fn left_m(analysis: &Analysis<'_>) -> f64 {
-    let square: f64 = analysis.residuals.iter().flat_map(|row| row.after_m).map(|value| value * value).sum();
+/// RMS of one part of the residuals, m.
+fn rms_m(analysis: &Analysis<'_>, part: impl Fn(&Residual) -> [f64; 3]) -> f64 {
+    let square: f64 = analysis.residuals.iter().flat_map(part).map(|value| value * value).sum();
     (square / analysis.residuals.len().max(1) as f64).sqrt()
 }
 
 /// Joints whose readings were rounded so much that it shows.
 fn rounding(analysis: &Analysis<'_>) -> Vec<String> {
     let rows = analysis.rows;
-    let sensor_m = 3_f64.sqrt() * mean_sigma(analysis.sensor, analysis.measurements);
+    let sensor_m = 3_f64.sqrt() * analysis.sigma_m();
     // By step: the joints and the square of the error that they make, m².
     let mut found: Vec<(&str, Vec<String>, f64)> = Vec::new();
     for joint in (0..rows.mechanism.joint_count()).filter(|joint| !rows.mechanism.slides[*joint]) {
@@ -123,8 +123,7 @@ fn rounding(analysis: &Analysis<'_>) -> Vec<String> {
             None => found.push((name, vec![(joint + 1).to_string()], square)),
         }
     }
-    let before: f64 = analysis.residuals.iter().flat_map(|row| row.before_m).map(|value| value * value).sum();
-    let before_m = (before / analysis.residuals.len().max(1) as f64).sqrt();
+    let before_m = rms_m(analysis, |row| row.before_m);
     // Where less is left, the arm stood where the rounded readings say.
     let shows = |square: f64| square.sqrt() > ROUNDED * sensor_m && square.sqrt() < 1.5 * before_m;
     found

@@ -1,9 +1,9 @@
 //! Readings that are far off: their weights, and the evidence that there are any.
 
 /// Squares (in sigmas) beyond which one reading in a thousand lies where the noise is Gaussian, for 3 and 6 equations a row.
-const RARE: [f64; 2] = [16.27, 22.46];
+pub(super) const RARE: [f64; 2] = [16.27, 22.46];
 /// Medians of the same squares.
-const MEDIAN: [f64; 2] = [2.366, 5.348];
+pub(super) const MEDIAN: [f64; 2] = [2.366, 5.348];
 
 /// What there is of outliers.
 #[derive(Clone, Debug, PartialEq)]

@@ -79,8 +79,8 @@ pub(super) fn is_contested(of: &Hypothesis) -> bool {
         || matches!(of.shape, Shape::Bump { .. })
 }
 
-/// The joints that scatter, given what was found, most likely first. `known`: some do already in what makes the equations alike, so that
-/// ripples and bumps that are there are there beside it.
+/// The joints that scatter, given what was found, most likely first. `known`: some scatter was in the noise already when that was found, so
+/// that its ripples and bumps do not stand in for it.
 pub(super) fn look(
     rows: &Rows,
     problem: &Problem,

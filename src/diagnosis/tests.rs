@@ -16,6 +16,7 @@ use crate::scene;
 use crate::seed::{Stream, stream};
 
 const SIGMA: f64 = 20e-6;
+const ATTITUDE_SIGMA: f64 = 2e-5;
 
 fn arm() -> Arm {
     scene::read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml")).unwrap().scene.arm
@@ -57,7 +58,7 @@ fn torque(arm: &Arm, joints: &[f64], joint: usize, payload_kg: f64) -> f64 {
 
 fn readings(label: &str, off: impl Fn(&Arm, &[f64], &[i8], usize, f64) -> f64) -> (Arm, Vec<Measurement>) {
     let arm = arm();
-    let mut stream: Stream = stream(5, label);
+    let (mut stream, mut turns): (Stream, Stream) = (stream(5, label), stream(6, label));
     let mut values = arm.chain.nominal();
     for (value, parameter) in values.iter_mut().zip(&arm.chain.parameters) {
         let half = if parameter.quantity.unit() == "m" { 1e-3 } else { 3e-3 };
@@ -72,13 +73,18 @@ fn readings(label: &str, off: impl Fn(&Arm, &[f64], &[i8], usize, f64) -> f64) -
             let true_joints: Vec<f64> =
                 (0..joints.len()).map(|joint| joints[joint] + off(&arm, &joints, &approach, joint, payload_kg)).collect();
             let noise = Vector3::from_fn(|_, _| SIGMA * stream.normal());
-            let position = at.forward(&true_joints).translation.vector + noise;
+            let pose = at.forward(&true_joints);
+            let position = pose.translation.vector + noise;
+            // Read only where the sensor has attitudes.
+            let turn = Vector3::from_fn(|_, _| ATTITUDE_SIGMA * turns.normal());
+            let attitude = pose.rotation * UnitQuaternion::from_scaled_axis(turn);
             Measurement {
                 index,
                 pose_id: index,
                 time_s: 60.0 * index as f64,
                 joints,
                 position_m: position.into(),
+                attitude_xyzw: Some(attitude.coords.into()),
                 approach,
                 payload_kg: Some(payload_kg),
                 ..Measurement::default()
@@ -170,29 +176,14 @@ fn a_joint_that_does_not_repeat_is_no_ripple() {
 
 #[test]
 fn attitudes_that_are_better_than_said_are_no_effect() {
-    let (arm, mut rows) = readings("test/attitudes", |_, _, _, _, _| 0.0);
-    let mut stream = stream(6, "test/attitudes");
-    // The arm of the readings is that of their first draws.
-    let mut values = arm.chain.nominal();
-    let mut drawn = crate::seed::stream(5, "test/attitudes");
-    for (value, parameter) in values.iter_mut().zip(&arm.chain.parameters) {
-        let half = if parameter.quantity.unit() == "m" { 1e-3 } else { 3e-3 };
-        *value += drawn.uniform(-half, half);
-    }
-    let at = arm.chain.at(&values);
-    for row in &mut rows {
-        let noise = Vector3::from_fn(|_, _| 2e-5 * stream.normal());
-        let attitude = at.forward(&row.joints).rotation * UnitQuaternion::from_scaled_axis(noise);
-        row.attitude_xyzw = Some(attitude.coords.into());
-    }
-    let said = 9e-5;
-    let sensor = Sensor { attitude_sigma_rad: Some(said), ..sensor() };
+    let (arm, rows) = readings("test/attitudes", |_, _, _, _, _| 0.0);
+    let sensor = Sensor { attitude_sigma_rad: Some(4.5 * ATTITUDE_SIGMA), ..sensor() };
     let rows: Vec<&Measurement> = rows.iter().collect();
     let options = Options { noise: NoiseSource::Declared, without: Vec::new(), only: None };
     let found = diagnose(&arm, &sensor, &rows, &options).unwrap();
     assert!(found.effects.is_empty() && !found.unknown.present, "{}", found.sentence);
     let sigma = found.noise_floor.rotation_rad.unwrap();
-    assert!((sigma / 2e-5 - 1.0).abs() < 0.25, "{sigma}");
+    assert!((sigma / ATTITUDE_SIGMA - 1.0).abs() < 0.25, "{sigma}");
     assert!(found.notes.iter().any(|note| note.contains("attitudes are taken to be read")), "{:?}", found.notes);
 }
 

@@ -1,9 +1,9 @@
 //! Whether something is left that no effect of the library explains.
 
+use super::Analysis;
 use super::claims::{NAMED, probability};
 use super::outcome::{NoiseFloor, NoiseSource, Unknown};
 use super::sentence::whose;
-use super::{Analysis, mean_sigma};
 
 /// Of the residual having no structure: below this there is some.
 const STRUCTURED: f64 = 0.003;
@@ -17,7 +17,7 @@ pub(super) fn unknown(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFl
     let structured = p_value < STRUCTURED;
     // A sensor may be somewhat worse than it says, not this much.
     let known = !matches!(noise_floor.source, NoiseSource::Assumed);
-    let over = noise_floor.position_m / mean_sigma(analysis.sensor, analysis.measurements);
+    let over = noise_floor.position_m / analysis.sigma_m();
     let excess = known && level > EXCESS * over * over;
     let scatters = !analysis.scatter.is_empty();
     let present = of_nameless >= NAMED || structured || excess || scatters;

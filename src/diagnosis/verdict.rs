@@ -1,5 +1,6 @@
 //! From what was found to what is said: the verdict, and all that stands beside it.
 
+use super::Analysis;
 use super::advice::next;
 use super::claims::{NAMED, SURE};
 use super::confusion::confusion;
@@ -11,7 +12,6 @@ use super::notes::notes;
 use super::outcome::{Candidate, Diagnosis, Effect, NoiseFloor, NoiseSource, Residual, Unknown, Verdict};
 use super::sentence::sentence;
 use super::unknown::unknown;
-use super::{Analysis, mean_sigma};
 use crate::effects::Kind;
 
 /// Of the kinds and places, so many must be detectable at a realistic magnitude for "no gap".
@@ -52,22 +52,23 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
 fn noise_floor(analysis: &Analysis<'_>) -> NoiseFloor {
     let (position_m, source) = match analysis.repeats {
         Some(repeats) => (repeats.position_m, NoiseSource::Repeats),
-        None => (mean_sigma(analysis.sensor, analysis.measurements), analysis.options.noise),
+        None => (analysis.sigma_m(), analysis.options.noise),
     };
     // In the same proportion to that of the positions as what is left of them.
-    let proportion = position_m / mean_sigma(analysis.sensor, analysis.measurements);
+    let proportion = position_m / analysis.sigma_m();
     let rotation_rad = analysis.sensor.attitude_sigma_rad.filter(|_| analysis.rows.per_row == 6).map(|sigma| sigma * proportion);
     NoiseFloor { position_m, rotation_rad, source }
 }
 
 /// `share`: of the kinds and places that would have shown.
 fn decide(unknown: &Unknown, effects: &[Effect], sets: &[Vec<Candidate>], share: f64) -> Verdict {
+    // Sure, and the same for half of the folds at least.
+    let settled = |effect: &&Effect| effect.probability >= SURE && 2 * effect.folds[0] >= effect.folds[1];
     let named: Vec<&Effect> = effects.iter().filter(|effect| effect.kind != Kind::MeasurementOutliers.name()).collect();
     let open = sets.iter().any(|set| set.iter().map(|candidate| candidate.probability).sum::<f64>() >= NAMED);
     if unknown.present {
         Verdict::UnknownRemains
-    } else if !named.is_empty() && named.iter().all(|effect| effect.probability >= SURE && 2 * effect.folds[0] >= effect.folds[1])
-    {
+    } else if !named.is_empty() && named.iter().all(settled) {
         Verdict::Explained
     } else if !named.is_empty() || open {
         Verdict::Ambiguous

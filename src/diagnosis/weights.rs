@@ -32,8 +32,6 @@ pub(super) fn weigh(rows: &Rows, residual: &DVector<f64>, before: &[f64], groups
     Weighed { squares, far, dependent, correlation }
 }
 
-/// Medians of squares over one sigma's, of three equations.
-const MEDIAN: f64 = 2.366;
 /// Degrees of freedom of repeats from which on they tell the attitudes' noise.
 const ENOUGH: f64 = 36.0;
 /// Mean square, over what is said of the noise, beyond which what is left is no noise.
@@ -64,7 +62,7 @@ pub(super) fn attitude_over_position(rows: &Rows, residual: &DVector<f64>, known
         let square = |row: &usize| whitened.rows(6 * row + first, 3).norm_squared() / rows.whitening.weights()[*row];
         let mut squares: Vec<f64> = counts.iter().map(square).collect();
         squares.sort_by(f64::total_cmp);
-        squares.get(squares.len() / 2).map_or(0.0, |middle| middle / MEDIAN)
+        squares.get(squares.len() / 2).map_or(0.0, |middle| middle / outliers::MEDIAN[0])
     };
     let (position, attitude) = (level(0), level(3));
     if position <= 0.0 || attitude <= 0.0 || position.min(attitude) > NO_NOISE {

@@ -107,6 +107,17 @@ impl Sensor {
         self.position_sigma_m + self.position_sigma_per_m * (position - self.position_in_base.coords).norm()
     }
 
+    /// Mean position noise of `measurements`, one sigma per axis, m.
+    #[must_use]
+    pub fn mean_position_sigma<'a>(&self, measurements: impl IntoIterator<Item = &'a Measurement>) -> f64 {
+        let (mut sum, mut count) = (0.0, 0_usize);
+        for row in measurements {
+            sum += self.position_sigma_at(&row.position().coords);
+            count += 1;
+        }
+        (sum / count.max(1) as f64).max(1e-9)
+    }
+
     /// Whether the sensor sees `point` (in base, m): within its cone, apex included, or anywhere where it has none.
     #[must_use]
     pub fn sees(&self, point: &Vector3<f64>) -> bool {

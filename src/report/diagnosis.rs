@@ -51,7 +51,7 @@ pub fn answer(diagnosis: &Diagnosis) -> String {
 }
 
 /// A p-value in words.
-fn p(value: f64) -> String {
+pub(crate) fn p(value: f64) -> String {
     if value < 1e-12 { "p < 1e-12".to_owned() } else { format!("p = {}", number(value)) }
 }
 

@@ -192,7 +192,7 @@ fn markdown(diagnosis: &Diagnosis) -> String {
     }
     if diagnosis.unknown.present {
         let place = diagnosis.unknown.r#where.as_deref().unwrap_or_default();
-        text += &format!("**Unknown:** {place} (p = {}).\n\n", significant(diagnosis.unknown.p_value, 2));
+        text += &format!("**Unknown:** {place} ({}).\n\n", report::p(diagnosis.unknown.p_value));
     }
     for (heading, items) in [("Measure next", &diagnosis.next_measurements), ("Notes", &diagnosis.notes)] {
         if !items.is_empty() {
