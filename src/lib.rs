@@ -4,24 +4,24 @@
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "an oracle may compute as it likes"))]
 
 pub mod arm;
-pub mod cell;
 pub mod cli;
 pub mod design;
 pub mod diagnosis;
 pub mod effects;
-pub mod experiments;
+pub mod event;
 pub mod figure;
-pub mod frames;
 pub mod identification;
-pub mod kinematics;
+pub mod lab;
 pub mod measurement;
-pub mod physics;
+pub mod progress;
 pub mod quality;
 pub mod recording;
 pub mod report;
 pub mod scene;
 pub mod seed;
-pub mod self_collision;
 pub mod session;
+pub mod simulation;
+pub mod statistics;
+pub mod units;
 #[cfg(feature = "viewer")]
 pub mod viewing;

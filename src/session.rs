@@ -1,22 +1,26 @@
 //! The steps of a calibration chained: what the commands do, and what a replay does again.
 
 use crate::arm::Arm;
-use crate::cell::measure::MeasureError;
-use crate::cell::plan::{as_measured, plan};
-use crate::cell::{Truth, measure};
+use crate::arm::urdf::{self, UrdfError};
 use crate::design::candidates::NothingMeasurable;
 use crate::design::outcome::DesignOutcome;
+use crate::design::search::SearchReport;
 use crate::design::{self, DesignError};
 use crate::diagnosis::outcome::{Diagnosis, NoiseSource};
 use crate::diagnosis::rows::DiagnosisError;
 use crate::diagnosis::{self, Options};
+use crate::event::{Event, Listener, RealCell, Start};
 use crate::identification::alignment::{AlignmentError, align};
 use crate::identification::outcome::Identification;
 use crate::identification::{IdentificationError, identify};
-use crate::kinematics::urdf::{self, UrdfError};
+use crate::measurement::Weights;
 use crate::measurement::{Measurement, Role, Sensor};
-use crate::recording::event::{Event, Listener, ListenerError, RealCell, Start};
-use crate::scene::{self, Injected, Scene, SceneError, Weights};
+use crate::progress::Stopped;
+use crate::scene::{self, Scene, SceneError};
+use crate::simulation::cell::measure::MeasureError;
+use crate::simulation::cell::plan::{Planned, as_measured, plan};
+use crate::simulation::cell::{Truth, measure};
+use crate::simulation::injected::Injected;
 
 /// A step failed.
 #[derive(Debug, thiserror::Error)]
@@ -47,7 +51,7 @@ pub enum SessionError {
     Scene(#[from] SceneError),
     /// Recording or showing.
     #[error(transparent)]
-    Listener(#[from] ListenerError),
+    Listener(#[from] Stopped),
 }
 
 /// What a whole run yields.
@@ -71,19 +75,58 @@ pub struct Run {
 /// Whatever a step reports.
 pub fn run(scene: &Scene, scene_toml: &str, injected: &Injected, listener: &mut dyn Listener) -> Result<Run, SessionError> {
     start("run", scene_toml, listener)?;
-    let design = design::design(scene, listener)?;
+    let design = design_and_tell(scene, listener)?;
     let (measurements, truth) = measure_design(scene, injected, &design.configurations, listener)?;
     let identification = identify_and_tell(scene, &measurements, listener)?;
     let diagnosis = diagnose_and_tell(scene, &measurements, listener)?;
     Ok(Run { design, measurements, identification, diagnosis, truth })
 }
 
+/// Chooses the configurations of `scene`, telling the listener every step and the outcome.
+///
+/// # Errors
+/// If no configuration may be measured, or the listener fails.
+pub fn design_and_tell(scene: &Scene, listener: &mut dyn Listener) -> Result<DesignOutcome, DesignError> {
+    let mut watch = |report: SearchReport| {
+        listener.report(&match report {
+            SearchReport::Swarm(iteration) => Event::Swarm(iteration),
+            SearchReport::Step(step) => Event::Search(step),
+        })
+    };
+    let outcome = design::design(&scene.request(), &mut watch)?;
+    listener.report(&Event::Designed(outcome.clone()))?;
+    Ok(outcome)
+}
+
+/// The configurations that verify a calibration of `scene`.
+///
+/// # Errors
+/// If none may be measured.
+pub fn held_out(scene: &Scene) -> Result<Vec<Vec<f64>>, NothingMeasurable> {
+    design::held_out(&scene.request(), scene.plan.held_out_count, scene.plan.held_out_exact)
+}
+
+/// Measures `planned` in the cell of `scene` (see [`measure`]), telling the listener every measurement.
+///
+/// # Errors
+/// If the arm cannot be simulated, or the listener fails.
+pub fn measure_and_tell(
+    scene: &Scene,
+    injected: &Injected,
+    planned: &[Planned],
+    session_poses: usize,
+    listener: &mut dyn Listener,
+) -> Result<(Vec<Measurement>, Truth), MeasureError> {
+    let mut tell = |measurement: &Measurement| listener.report(&Event::Measured(measurement.clone()));
+    measure(&scene.cell(), injected, planned, session_poses, &mut tell)
+}
+
 /// The first event of every recording.
 ///
 /// # Errors
 /// If the listener fails.
-pub fn start(command: &str, scene_toml: &str, listener: &mut dyn Listener) -> Result<(), ListenerError> {
-    listener.take(&Event::Start(start_event(command, scene_toml)))
+pub fn start(command: &str, scene_toml: &str, listener: &mut dyn Listener) -> Result<(), Stopped> {
+    listener.report(&Event::Start(start_event(command, scene_toml)))
 }
 
 /// What a recording of this version begins with.
@@ -99,9 +142,9 @@ pub fn start_event(command: &str, scene_toml: &str) -> Start {
 }
 
 /// The result, then its notes one by one.
-fn tell(identification: &Identification, listener: &mut dyn Listener) -> Result<(), ListenerError> {
-    listener.take(&Event::Identified(identification.clone()))?;
-    identification.notes.iter().try_for_each(|note| listener.take(&Event::Note(note.clone())))
+fn tell(identification: &Identification, listener: &mut dyn Listener) -> Result<(), Stopped> {
+    listener.report(&Event::Identified(identification.clone()))?;
+    identification.notes.iter().try_for_each(|note| listener.report(&Event::Note(note.clone())))
 }
 
 /// A real arm in the frame in which it was measured, and its sensor.
@@ -132,15 +175,15 @@ pub fn real_robot(start: &Start, real: &RealCell) -> Result<(Arm, Vec<String>), 
     }
 }
 
-/// The sensor of a real cell: as declared, attitudes where all rows have them.
+/// The sensor of a real cell: as declared, orientations where all rows have them.
 #[must_use]
 pub fn real_sensor(real: &RealCell, measurements: &[Measurement]) -> Sensor {
-    let attitude = measurements.iter().all(|measurement| measurement.attitude_xyzw.is_some());
+    let orientation = measurements.iter().all(|measurement| measurement.orientation_xyzw.is_some());
     Sensor {
         position_in_base: nalgebra::Point3::origin(),
         position_sigma_m: real.position_sigma_m,
         position_sigma_per_m: 0.0,
-        attitude_sigma_rad: attitude.then_some(real.attitude_sigma_rad),
+        orientation_sigma_rad: orientation.then_some(real.orientation_sigma_rad),
         temperature_sigma_k: None,
         view: None,
     }
@@ -184,8 +227,8 @@ pub fn measure_design(
     chosen: &[Vec<f64>],
     listener: &mut dyn Listener,
 ) -> Result<(Vec<Measurement>, Truth), SessionError> {
-    let planned = plan(scene, chosen, &design::held_out(scene)?);
-    Ok(measure(scene, injected, &planned, planned.len(), listener)?)
+    let planned = plan(&scene.cell(), chosen, &held_out(scene)?);
+    Ok(measure_and_tell(scene, injected, &planned, planned.len(), listener)?)
 }
 
 /// Identifies the scene's arm and tells the listener.
@@ -226,9 +269,9 @@ pub fn diagnose_and_tell(
     scene: &Scene,
     measurements: &[Measurement],
     listener: &mut dyn Listener,
-) -> Result<Result<Diagnosis, DiagnosisError>, ListenerError> {
+) -> Result<Result<Diagnosis, DiagnosisError>, Stopped> {
     let diagnosis = diagnose(scene, measurements);
-    listener.take(&match &diagnosis {
+    listener.report(&match &diagnosis {
         Ok(diagnosis) => Event::Diagnosed(Box::new(diagnosis.clone())),
         Err(error) => Event::Note(format!("{NO_DIAGNOSIS}{error}")),
     })?;
@@ -263,29 +306,29 @@ pub fn replay(
         match event {
             Event::Start(start) => {
                 let repeated = start_event(&start.command, &start.scene);
-                listener.take(&Event::Start(Start { poses: start.poses, real: start.real.clone(), ..repeated }))?;
+                listener.report(&Event::Start(Start { poses: start.poses, real: start.real.clone(), ..repeated }))?;
             }
             Event::Swarm(_) | Event::Search(_) | Event::Designed(_) => {
                 // Once: the design tells all its events itself.
                 if let (false, Subject::Scene(scene)) = (designed, subject) {
                     designed = true;
-                    chosen = Some(design::design(scene, listener)?.configurations);
+                    chosen = Some(design_and_tell(scene, listener)?.configurations);
                 }
             }
             Event::Measured(measurement) => match (injected, subject) {
                 (None, _) | (_, Subject::Real(_)) => {
-                    listener.take(event)?;
+                    listener.report(event)?;
                     measured.get_or_insert_default().push(measurement.clone());
                 }
                 (Some(injected), Subject::Scene(scene)) if measured.is_none() => {
                     let planned = match &chosen {
-                        Some(chosen) => plan(scene, chosen, &design::held_out(scene)?),
+                        Some(chosen) => plan(&scene.cell(), chosen, &held_out(scene)?),
                         None => {
                             let rows = recorded.iter().filter_map(|event| match event {
                                 Event::Measured(measurement) => Some(measurement.clone()),
                                 _ => None,
                             });
-                            as_measured(scene, &rows.collect::<Vec<_>>())
+                            as_measured(&scene.cell(), &rows.collect::<Vec<_>>())
                         }
                     };
                     // A recording that was cut off holds fewer poses than the session had.
@@ -294,7 +337,7 @@ pub fn replay(
                         _ => None,
                     });
                     let session = session.unwrap_or(planned.len());
-                    let (measurements, new_truth) = measure(scene, injected, &planned, session, listener)?;
+                    let (measurements, new_truth) = measure_and_tell(scene, injected, &planned, session, listener)?;
                     measured = Some(measurements);
                     truth = Some(new_truth);
                 }
@@ -319,11 +362,7 @@ pub fn replay(
 }
 
 /// The diagnosis again. Those of real arms are not recorded; where one is, it cannot be recomputed and counts as different.
-fn replay_diagnosis(
-    subject: Subject<'_>,
-    measured: Option<&[Measurement]>,
-    listener: &mut dyn Listener,
-) -> Result<(), ListenerError> {
+fn replay_diagnosis(subject: Subject<'_>, measured: Option<&[Measurement]>, listener: &mut dyn Listener) -> Result<(), Stopped> {
     match subject {
         Subject::Scene(scene) => diagnose_and_tell(scene, measured.unwrap_or_default(), listener).map(|_| ()),
         Subject::Real(_) => Ok(()),

@@ -291,9 +291,9 @@ pub(crate) struct RobotOptions {
     /// Declared position noise of a table's sensor, one sigma per axis [default: 20]
     #[arg(long, value_name = "UM", allow_negative_numbers = true)]
     pub(crate) position_noise_um: Option<f64>,
-    /// Declared attitude noise of a table's sensor, one sigma per axis [default: 0.005]
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
-    pub(crate) attitude_noise_deg: Option<f64>,
+    /// Declared orientation noise of a table's sensor, one sigma per axis [default: 0.005]
+    #[arg(long = "attitude-noise-deg", value_name = "DEG", allow_negative_numbers = true)]
+    pub(crate) orientation_noise_deg: Option<f64>,
 }
 
 #[derive(Debug, Args)]
@@ -424,9 +424,9 @@ pub(crate) struct SweepOptions {
 
 /// Names of the experiments, with what they repeat.
 fn items() -> PossibleValuesParser {
-    let named = crate::experiments::ALL
+    let named = crate::lab::reproduce::ALL
         .iter()
-        .chain(crate::experiments::BEYOND)
+        .chain(crate::lab::reproduce::BEYOND)
         .map(|experiment| PossibleValue::new(experiment.name).help(format!("{}: {}", experiment.place, experiment.about)));
     let everything = PossibleValue::new(super::reproduce::EVERYTHING).help("All of the paper's: tables and figures");
     PossibleValuesParser::new(named.chain([everything]).collect::<Vec<_>>())

@@ -11,18 +11,18 @@ use super::Outcome;
 use super::arguments::{Baseline, ChallengeCommand, Global, NewOptions, SceneOptions, ScoreOptions};
 use super::output;
 use super::reproduce::Progress;
-use crate::cell;
 use crate::effects::{Kind, Location};
-use crate::experiments::arms::arm8;
-use crate::experiments::bench::Watcher;
-use crate::experiments::challenge::folder::{self, COMMITMENT, MANIFEST, SEAL};
-use crate::experiments::challenge::score::{self, closes, restorable};
-use crate::experiments::challenge::verdict::{Diagnose, Gap, Verdict, nothing};
-use crate::experiments::challenge::{CaseTruth, Folder, Options, TrueEffect, case};
-use crate::experiments::injection::Sort;
+use crate::lab::challenge::folder::{self, COMMITMENT, MANIFEST, SEAL};
+use crate::lab::challenge::score::{self, closes, restorable};
+use crate::lab::challenge::verdict::{Diagnose, Gap, Verdict, nothing};
+use crate::lab::challenge::{CaseTruth, Folder, Options, TrueEffect, case};
+use crate::lab::injection::Sort;
+use crate::lab::reproduce::arms::arm8;
+use crate::lab::reproduce::bench::Watcher;
 use crate::recording::truth_file::write_whole;
 use crate::report;
 use crate::scene::SceneFile;
+use crate::simulation::cell;
 
 /// What every command writes to if nobody says where.
 const USUAL_OUT: &str = "recordings";
@@ -109,7 +109,7 @@ fn new(global: &Global, options: &NewOptions) -> anyhow::Result<Outcome> {
     // What is wrong with the scene is said before anything is written.
     let key = case::key(seed);
     let public = case::public(&base, &cases, &key, 0)?;
-    cell::measure::check(&public.file.scene, &case::hidden(&public, &cases, &key, 0).injected)?;
+    cell::measure::check(&public.file.scene.cell(), &case::hidden(&public, &cases, &key, 0).injected)?;
     if seed < GUESSABLE {
         output::note(
             global,

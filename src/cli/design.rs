@@ -5,14 +5,14 @@ use serde_json::json;
 use super::Outcome;
 use super::arguments::{Global, SceneOptions};
 use super::output::{self, Audience};
-use crate::{design, report, session};
+use crate::{report, session};
 
 pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result<Outcome> {
     let file = output::scene(global, options)?;
     let stem = output::stem(global, &file, "-design");
     let mut audience = Audience::open(global, &file.scene.arm, Some(&file.scene.design), Some(&stem), &stem)?;
     session::start("design", &file.public_toml()?, &mut audience)?;
-    let outcome = design::design(&file.scene, &mut audience)?;
+    let outcome = session::design_and_tell(&file.scene, &mut audience)?;
     let recording = audience.finish()?;
     output::show(global, &report::design(&outcome, file.scene.arm.chain.parameters.len(), file.scene.design.jacobian_scaling))?;
     if let Some(recording) = &recording {

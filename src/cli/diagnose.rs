@@ -10,9 +10,10 @@ use crate::arm::Arm;
 use crate::diagnosis::outcome::{Diagnosis, NoiseSource, Verdict};
 use crate::diagnosis::{self, Options};
 use crate::effects::Kind;
-use crate::experiments::confirm::{Answer, confirm};
+use crate::event::{Event, Start};
+use crate::lab::confirm::{Answer, confirm};
 use crate::measurement::{Measurement, Sensor, table};
-use crate::recording::event::{Event, Listener, Start};
+use crate::progress::Progress as _;
 use crate::{report, scene, session};
 
 pub(crate) fn command(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Outcome> {
@@ -62,11 +63,11 @@ fn show(global: &Global, options: &DiagnoseOptions, subject: &Subject, diagnosis
     });
     let stem = input::input_stem(&options.input, "-diagnosed");
     let mut audience = Audience::open(global, placed.as_ref().unwrap_or(&subject.arm), None, None, &stem)?;
-    audience.take(&Event::Start(subject.start.clone()))?;
+    audience.report(&Event::Start(subject.start.clone()))?;
     for measurement in &subject.measurements {
-        audience.take(&Event::Measured(measurement.clone()))?;
+        audience.report(&Event::Measured(measurement.clone()))?;
     }
-    audience.take(&Event::Diagnosed(Box::new(diagnosis.clone())))?;
+    audience.report(&Event::Diagnosed(Box::new(diagnosis.clone())))?;
     audience.finish()?;
     Ok(())
 }

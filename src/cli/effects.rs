@@ -6,7 +6,7 @@ use serde_json::json;
 use super::Outcome;
 use super::arguments::{EffectsOptions, Global};
 use super::output;
-use crate::experiments::effect_validation::{self, Line};
+use crate::lab::effect_validation::{self, Line};
 use crate::report;
 
 pub(crate) fn command(global: &Global, options: &EffectsOptions) -> anyhow::Result<Outcome> {

@@ -7,9 +7,9 @@ use super::Outcome;
 use super::arguments::{ExportOptions, Format, Global};
 use super::input::{input_stem, is_recording};
 use super::output;
-use crate::kinematics::urdf;
+use crate::arm::urdf;
+use crate::event::Event;
 use crate::measurement::{Measurement, Sensor, table};
-use crate::recording::event::Event;
 use crate::{recording, scene, session};
 
 pub(crate) fn command(global: &Global, options: &ExportOptions) -> anyhow::Result<Outcome> {
@@ -102,10 +102,10 @@ fn from_recording(global: &Global, options: &ExportOptions) -> anyhow::Result<(&
 /// A note that says how exact the readings are, for the table has no column for that.
 fn noise_options(sensor: &Sensor, measured: &[Measurement]) -> String {
     let sigma = sensor.mean_position_sigma(measured);
-    let attitude =
-        sensor.attitude_sigma_rad.map(|sigma| format!(" --attitude-noise-deg {:.5}", sigma.to_degrees())).unwrap_or_default();
+    let orientation =
+        sensor.orientation_sigma_rad.map(|sigma| format!(" --attitude-noise-deg {:.5}", sigma.to_degrees())).unwrap_or_default();
     format!(
-        "note: a table does not say how exact its readings are; for identify and diagnose: --position-noise-um {:.2}{attitude}",
+        "note: a table does not say how exact its readings are; for identify and diagnose: --position-noise-um {:.2}{orientation}",
         sigma * 1e6
     )
 }

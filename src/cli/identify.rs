@@ -10,8 +10,9 @@ use super::arguments::{Global, IdentifyOptions};
 use super::input;
 use super::output::{self, Audience};
 use crate::arm::Arm;
+use crate::event::{Event, RealCell, Start};
 use crate::measurement::{Measurement, Role, table};
-use crate::recording::event::{Event, Listener, RealCell, Start};
+use crate::progress::Progress as _;
 use crate::{recording, report, scene, session};
 
 pub(crate) fn command(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outcome> {
@@ -33,7 +34,7 @@ fn from_recording(global: &Global, options: &IdentifyOptions) -> anyhow::Result<
     let mut audience = Audience::open(global, &scene.arm, None, Some(&stem), &stem)?;
     session::start("identify", &file.public_toml()?, &mut audience)?;
     for measurement in &measurements {
-        audience.take(&Event::Measured(measurement.clone()))?;
+        audience.report(&Event::Measured(measurement.clone()))?;
     }
     let identification = session::identify_and_tell(scene, &measurements, &mut audience)?;
     let recording = audience.finish()?;
@@ -69,9 +70,9 @@ fn real_cell(
 
     let stem = input::input_stem(&options.input, "-identified");
     let mut audience = Audience::open(global, &real.arm, None, Some(&stem), &stem)?;
-    audience.take(&Event::Start(start))?;
+    audience.report(&Event::Start(start))?;
     for measurement in &measurements {
-        audience.take(&Event::Measured(measurement.clone()))?;
+        audience.report(&Event::Measured(measurement.clone()))?;
     }
     let identification = session::identify_real(&real, &measurements, &mut audience)?;
     let recording = audience.finish()?;

@@ -7,15 +7,15 @@ use anyhow::{Context, bail, ensure};
 use super::arguments::{Global, RobotOptions};
 use super::output;
 use crate::arm::Arm;
-use crate::kinematics::{JointKind, urdf};
+use crate::arm::{JointKind, urdf};
+use crate::event::{Event, RealCell, Start};
 use crate::measurement::{Measurement, table};
-use crate::recording::event::{Event, RealCell, Start};
 use crate::{recording, scene, session};
 
 /// Position noise that is assumed where none is declared, µm.
 pub(crate) const POSITION_NOISE_UM: f64 = 20.0;
-/// Attitude noise that is assumed where none is declared, degrees.
-pub(crate) const ATTITUDE_NOISE_DEG: f64 = 0.005;
+/// Orientation noise that is assumed where none is declared, degrees.
+pub(crate) const ORIENTATION_NOISE_DEG: f64 = 0.005;
 
 /// The first event and the measurements of a recording.
 pub(crate) fn recorded(global: &Global, path: &Path, partial: bool) -> anyhow::Result<(Start, Vec<Measurement>)> {
@@ -61,7 +61,7 @@ pub(crate) fn described(command: &str, robot: &Path, options: &RobotOptions) -> 
         base_link: options.base_link.clone(),
         tip_link: options.tip_link.clone(),
         position_sigma_m: options.position_noise_um.unwrap_or(POSITION_NOISE_UM) * 1e-6,
-        attitude_sigma_rad: options.attitude_noise_deg.unwrap_or(ATTITUDE_NOISE_DEG).to_radians(),
+        orientation_sigma_rad: options.orientation_noise_deg.unwrap_or(ORIENTATION_NOISE_DEG).to_radians(),
     };
     Ok((Start { real: Some(real.clone()), ..session::start_event(command, &scene) }, real))
 }
@@ -122,7 +122,7 @@ pub(crate) fn robot_of_table<'a>(input: &Path, options: &'a RobotOptions) -> any
         no_links(options, "the arm of a scene is taken whole; leave it out or give a URDF")?;
     }
     for (name, value) in
-        [("--position-noise-um", options.position_noise_um), ("--attitude-noise-deg", options.attitude_noise_deg)]
+        [("--position-noise-um", options.position_noise_um), ("--attitude-noise-deg", options.orientation_noise_deg)]
     {
         if let Some(value) = value {
             ensure!((1e-6..=1e6).contains(&value), "{name} {value}: a positive number is needed, from 0.000001 to 1000000");

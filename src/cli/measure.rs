@@ -6,8 +6,10 @@ use serde_json::json;
 use super::Outcome;
 use super::arguments::{Global, MeasureOptions};
 use super::output::{self, Audience};
-use crate::recording::event::{Event, Listener, Start};
-use crate::{cell, recording, report, session};
+use crate::event::{Event, Start};
+use crate::progress::Progress as _;
+use crate::simulation::cell;
+use crate::{recording, report, session};
 
 pub(crate) fn command(global: &Global, options: &MeasureOptions) -> anyhow::Result<Outcome> {
     let file = output::scene(global, &options.scene)?;
@@ -45,12 +47,12 @@ pub(crate) fn command(global: &Global, options: &MeasureOptions) -> anyhow::Resu
     let stem = output::stem(global, &file, "-measure");
     let truth_path = global.out.join(format!("{stem}.truth.toml"));
     output::check_key(global, injected);
-    cell::measure::check(scene, injected).with_context(|| options.scene.scene.display().to_string())?;
+    cell::measure::check(&scene.cell(), injected).with_context(|| options.scene.scene.display().to_string())?;
     output::check_target(&truth_path)?;
     output::plan_notes(global, scene, injected);
     let mut audience = Audience::open(global, &scene.arm, None, Some(&stem), &stem)?;
     let poses = Some((outcome.configurations.len() + scene.plan.held_out_count) * scene.plan.repeats);
-    audience.take(&Event::Start(Start { poses, ..session::start_event("measure", &file.public_toml()?) }))?;
+    audience.report(&Event::Start(Start { poses, ..session::start_event("measure", &file.public_toml()?) }))?;
     let (measurements, truth) = session::measure_design(scene, injected, &outcome.configurations, &mut audience)?;
     super::run::truth_file(&file, &truth)?.write(&truth_path)?;
     let recording = audience.finish()?;

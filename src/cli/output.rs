@@ -9,12 +9,15 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use super::Outcome;
 use super::arguments::{Global, SceneOptions};
 use crate::arm::Arm;
+use crate::design::problem::{Criterion, DesignProblem};
+use crate::event::Event;
 use crate::identification::outcome::Identification;
-use crate::recording::event::{Event, Listener, ListenerError};
+use crate::progress::Stopped;
 use crate::recording::truth_file::write_whole;
 use crate::recording::write::Recorder;
 use crate::report::criterion::Words;
-use crate::scene::{Criterion, DesignProblem, Injected, Scene, SceneFile};
+use crate::scene::{Scene, SceneFile};
+use crate::simulation::injected::Injected;
 
 /// Reads a scene and applies the overrides of the command line.
 pub(crate) fn scene(global: &Global, options: &SceneOptions) -> anyhow::Result<SceneFile> {
@@ -74,7 +77,7 @@ pub(crate) fn stem(global: &Global, file: &SceneFile, suffix: &str) -> String {
 
 /// Tells what should be known of a plan before it is carried out.
 pub(crate) fn plan_notes(global: &Global, scene: &Scene, injected: &Injected) {
-    crate::cell::plan::notes(scene, injected).iter().for_each(|text| note(global, &format!("note: {text}")));
+    crate::simulation::cell::plan::notes(&scene.cell(), injected).iter().for_each(|text| note(global, &format!("note: {text}")));
 }
 
 /// A note for people: on stderr, and not at all if they want quiet.
@@ -137,7 +140,7 @@ pub(crate) fn write_calibrated(path: PathBuf, arm: &Arm, identification: &Identi
         return Ok(None);
     }
     let values: Vec<f64> = identification.parameters.iter().map(|parameter| parameter.identified).collect();
-    write(&path, &crate::kinematics::urdf::export_with(arm, &values)?)?;
+    write(&path, &crate::arm::urdf::export_with(arm, &values)?)?;
     Ok(Some(path))
 }
 
@@ -207,7 +210,7 @@ impl Audience {
         #[cfg(feature = "viewer")]
         if let Some(viewer) = self.viewer.take() {
             match viewer.finish() {
-                // Nobody watches any more: no reason to call the run a failure.
+                // Silent watches any more: no reason to call the run a failure.
                 Err(error @ crate::viewing::ViewerError::Lost { .. }) => eprintln!("note: {error}"),
                 other => other?,
             }
@@ -226,15 +229,15 @@ impl Drop for Audience {
     }
 }
 
-impl Listener for Audience {
-    fn take(&mut self, event: &Event) -> Result<(), ListenerError> {
+impl crate::progress::Progress<&Event> for Audience {
+    fn report(&mut self, event: &Event) -> Result<(), Stopped> {
         self.progress.see(event);
         if let Some(recorder) = &mut self.recorder {
-            recorder.take(event)?;
+            recorder.report(event)?;
         }
         #[cfg(feature = "viewer")]
         if let Some(viewer) = &mut self.viewer {
-            viewer.take(event)?;
+            viewer.report(event)?;
         }
         Ok(())
     }

@@ -11,8 +11,8 @@ use super::output;
 use super::reproduce::Progress;
 use crate::arm::Arm;
 use crate::effects::Kind;
-use crate::experiments::challenge::{case, power};
-use crate::experiments::injection::Sort;
+use crate::lab::challenge::{case, power};
+use crate::lab::injection::Sort;
 use crate::recording::truth_file::write_whole;
 use crate::report;
 
@@ -99,7 +99,7 @@ fn what(given: &[String], arm: &Arm) -> anyhow::Result<Vec<(Kind, Option<usize>)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiments::arms::arm8;
+    use crate::lab::reproduce::arms::arm8;
 
     #[test]
     fn kinds_come_with_or_without_a_place() {

@@ -6,11 +6,12 @@ use serde_json::json;
 use super::Outcome;
 use super::arguments::{Global, ReplayOptions};
 use super::output::{self, Audience};
-use crate::cell::Truth;
+use crate::event::Event;
+use crate::progress::{Progress, Stopped};
 use crate::recording::compare::Comparer;
-use crate::recording::event::{Event, Listener, ListenerError};
 use crate::recording::truth_file::TruthFile;
 use crate::session::{self, Subject};
+use crate::simulation::cell::Truth;
 use crate::{recording, scene};
 
 pub(crate) fn command(global: &Global, options: &ReplayOptions) -> anyhow::Result<Outcome> {
@@ -129,13 +130,13 @@ struct Replayer {
     audience: Audience,
 }
 
-impl Listener for Replayer {
-    fn take(&mut self, event: &Event) -> Result<(), ListenerError> {
-        self.comparer.take(event)?;
+impl Progress<&Event> for Replayer {
+    fn report(&mut self, event: &Event) -> Result<(), Stopped> {
+        self.comparer.report(event)?;
         if self.comparer.is_past_cut() {
             // A swarm that was killed early would run to its end for nothing.
-            return Err(ListenerError("the recording ends here".to_owned()));
+            return Err(Stopped("the recording ends here".to_owned()));
         }
-        self.audience.take(event)
+        self.audience.report(event)
     }
 }

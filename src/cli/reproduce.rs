@@ -11,14 +11,14 @@ use serde_json::json;
 use super::Outcome;
 use super::arguments::{Global, ReproduceOptions};
 use super::output;
-use crate::cell;
-use crate::experiments::arms::arms;
-use crate::experiments::bench::{Bench, Watcher};
-use crate::experiments::findings::Findings;
-use crate::experiments::{ALL, BEYOND, Experiment};
+use crate::lab::reproduce::arms::arms;
+use crate::lab::reproduce::bench::{Bench, Watcher};
+use crate::lab::reproduce::findings::Findings;
+use crate::lab::reproduce::{ALL, BEYOND, Experiment};
 use crate::recording::truth_file::write_whole;
 use crate::report::findings as report;
 use crate::scene::{self, SceneFile};
+use crate::simulation::cell;
 
 /// The name that stands for all experiments.
 pub(super) const EVERYTHING: &str = "all";
@@ -90,7 +90,7 @@ fn scenes(global: &Global, paths: &[PathBuf]) -> anyhow::Result<Vec<(SceneFile, 
         if let Some(seed) = global.seed {
             file.set_seed(seed)?;
         }
-        cell::measure::check(&file.scene, output::injected(file, path)?)?;
+        cell::measure::check(&file.scene.cell(), output::injected(file, path)?)?;
     }
     Ok(scenes)
 }

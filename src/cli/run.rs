@@ -6,9 +6,10 @@ use serde_json::json;
 use super::Outcome;
 use super::arguments::{Global, SceneOptions};
 use super::output::{self, Audience};
-use crate::kinematics::urdf;
+use crate::arm::urdf;
 use crate::recording::truth_file::TruthFile;
-use crate::{cell, report, session};
+use crate::simulation::cell;
+use crate::{report, session};
 
 pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result<Outcome> {
     let file = output::scene(global, options)?;
@@ -19,7 +20,7 @@ pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result
     let [truth_path, urdf_path, calibrated_path] =
         ["truth.toml", "urdf", "calibrated.urdf"].map(|extension| global.out.join(format!("{stem}.{extension}")));
     output::check_key(global, injected);
-    cell::measure::check(scene, injected).with_context(|| options.scene.display().to_string())?;
+    cell::measure::check(&scene.cell(), injected).with_context(|| options.scene.display().to_string())?;
     [&truth_path, &urdf_path, &calibrated_path].into_iter().try_for_each(|path| output::check_target(path))?;
     output::plan_notes(global, scene, injected);
 
@@ -77,7 +78,7 @@ pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result
 }
 
 /// The truth file of a run of `file`.
-pub(crate) fn truth_file(file: &crate::scene::SceneFile, truth: &crate::cell::Truth) -> anyhow::Result<TruthFile> {
+pub(crate) fn truth_file(file: &crate::scene::SceneFile, truth: &crate::simulation::cell::Truth) -> anyhow::Result<TruthFile> {
     let mut section: toml::Table = toml::from_str(&file.injected_toml()?.unwrap_or_default())?;
     let injected = match section.remove("injected") {
         Some(toml::Value::Table(injected)) => injected,

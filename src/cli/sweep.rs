@@ -12,16 +12,17 @@ use super::arguments::{Global, SceneOptions, SweepOptions};
 use super::output;
 use super::reproduce::Progress;
 use crate::arm::Arm;
-use crate::cell;
+use crate::design::problem::Method;
 use crate::effects::Level;
-use crate::experiments::injection::{Sort, magnitudes, written};
-use crate::experiments::sweep::grid::{COURSES, Injecting, SCENES_COURSE};
-use crate::experiments::sweep::results::{Reader, merge};
-use crate::experiments::sweep::{Background, CellSummary, Grid, Header, Reduction, Results, Sweep};
+use crate::lab::injection::{Sort, magnitudes, written};
+use crate::lab::sweep::grid::{COURSES, Injecting, SCENES_COURSE};
+use crate::lab::sweep::results::{Reader, merge};
+use crate::lab::sweep::{Background, CellSummary, Grid, Header, Reduction, Results, Sweep};
 use crate::recording::tables::{self, Table};
 use crate::recording::truth_file::write_whole;
 use crate::report;
-use crate::scene::{Method, Scene};
+use crate::scene::Scene;
+use crate::simulation::cell;
 
 /// A magnitude so many times the largest realistic one is a mistake in its unit.
 const ABSURD: f64 = 100.0;
@@ -38,7 +39,7 @@ pub(crate) fn command(global: &Global, options: &SweepOptions) -> anyhow::Result
     let trials = trials(axes.trials.as_deref())?;
     let file = output::scene(global, &SceneOptions { scene: scene.clone(), set: options.set.clone() })?;
     let injected = output::injected(&file, &scene)?;
-    cell::measure::check(&file.scene, injected).with_context(|| scene.display().to_string())?;
+    cell::measure::check(&file.scene.cell(), injected).with_context(|| scene.display().to_string())?;
     let grid = axes.grid(&file.scene)?;
     let stem = output::stem(global, &file, "-sweep");
     let path = global.out.join(format!("{stem}.jsonl"));

@@ -4,8 +4,8 @@ use super::bound::{BoundError, bound};
 use super::candidates::Rules;
 use super::objective::Models;
 use super::outcome::Advice;
+use super::problem::{Criterion, DesignProblem};
 use crate::quality::prediction::Prediction;
-use crate::scene::{Criterion, Scene};
 
 /// Least number of candidates of the bound.
 const LEAST_POOL: usize = 500;
@@ -16,15 +16,15 @@ const LEAST_POOL: usize = 500;
 /// # Errors
 /// If there is no bound.
 pub fn advise(
-    scene: &Scene,
+    problem: &DesignProblem,
     models: &Models,
     rules: &Rules<'_>,
     chosen: &[f64],
     random: &[Vec<f64>],
 ) -> Result<Advice, BoundError> {
-    let joints = scene.arm.joint_count();
+    let joints = models.joint_count();
     // A small pool is the search's affair.
-    let bound = bound(models, rules, Criterion::IOptimality, scene.design.pool.max(LEAST_POOL))?;
+    let bound = bound(models, rules, Criterion::IOptimality, problem.pool.max(LEAST_POOL))?;
     let predicted: Vec<Prediction> = random.iter().filter_map(|set| models.predict(set, joints)).collect();
     let mean = |of: fn(&Prediction) -> f64| predicted.iter().map(of).sum::<f64>() / predicted.len() as f64;
     let errors = || predicted.iter().map(|prediction| prediction.position_rms_m);
@@ -32,12 +32,12 @@ pub fn advise(
         chosen: models.predict(chosen, joints),
         random: (!predicted.is_empty()).then(|| Prediction {
             position_rms_m: mean(|prediction| prediction.position_rms_m),
-            attitude_rms_rad: mean(|prediction| prediction.attitude_rms_rad),
+            orientation_rms_rad: mean(|prediction| prediction.orientation_rms_rad),
             position_worst_m: mean(|prediction| prediction.position_worst_m),
         }),
         random_range_m: [errors().reduce(f64::min).unwrap_or(0.0), errors().reduce(f64::max).unwrap_or(0.0)],
         random_undetermined: random.len() - predicted.len(),
-        bound_m: bound.least_rms_m(scene.design.count),
+        bound_m: bound.least_rms_m(problem.count),
         bound_gap: bound.gap,
         bound_candidates: bound.candidates,
     })

@@ -726,8 +726,8 @@ const PATIENCE: usize = 3;
 mod tests {
     use super::*;
     use crate::arm::Arm;
+    use crate::measurement::Weights;
     use crate::quality::information::{InformationModel, JacobianScratch};
-    use crate::scene::Weights;
     use crate::seed::stream;
 
     const CLOSE: Settings = Settings { gap: 1e-9, max_iterations: 200 };
@@ -760,12 +760,12 @@ mod tests {
     }
 
     /// Candidates of the paper's arm; and the mean of PᵀP over other configurations, for the first `rows` rows of the Jacobian.
-    fn pool(count: usize, share: f64, attitude: bool, rows: usize) -> (Blocks, Vec<f64>) {
+    fn pool(count: usize, share: f64, orientation: bool, rows: usize) -> (Blocks, Vec<f64>) {
         let mut scene = paper();
-        if attitude {
-            scene.sensor.attitude_sigma_rad = Some(0.001);
+        if orientation {
+            scene.sensor.orientation_sigma_rad = Some(0.001);
         } else {
-            scene.sensor.attitude_sigma_rad = None;
+            scene.sensor.orientation_sigma_rad = None;
         }
         let model = InformationModel::new(&scene.arm, &scene.sensor, Weights::Noise);
         let n = model.rank();
@@ -920,7 +920,7 @@ mod tests {
 
     #[test]
     fn pools_of_all_kinds_converge() {
-        for (count, share, attitude, rows) in [
+        for (count, share, orientation, rows) in [
             (1000, 1.0, true, 6),
             (1000, 0.3, true, 3),
             (300, 0.1, true, 6),
@@ -929,7 +929,7 @@ mod tests {
             (7, 1.0, true, 6),
             (12, 1.0, false, 3),
         ] {
-            let (blocks, matrix) = pool(count, share, attitude, rows);
+            let (blocks, matrix) = pool(count, share, orientation, rows);
             for criterion in [Criterion::D, Criterion::L(&matrix)] {
                 converged(&blocks, criterion, &Settings::default());
                 converged(&blocks, criterion, &Settings { gap: 1e-7, ..CLOSE });

@@ -25,7 +25,7 @@ pub fn search(task: &Task<'_>, stream: &mut Stream, watch: &mut Watch<'_>) -> Re
             best.configurations = sets.swap_remove(first);
         }
         let mean = values.iter().sum::<f64>() / values.len() as f64;
-        watch(task.step(step, mean, best.value, improved.then_some(&best.configurations)))?;
+        watch.report(task.step(step, mean, best.value, improved.then_some(&best.configurations)))?;
         step += 1;
     }
     Ok(best)

@@ -9,8 +9,8 @@ use rayon::prelude::*;
 use super::approximate::{self, ApproximateDesign, ApproximateError, Settings};
 use super::candidates::{NothingMeasurable, Rules, RulesScratch, Sampler};
 use super::objective::Models;
+use super::problem::Criterion;
 use crate::quality::information::Blocks;
-use crate::scene::Criterion;
 use crate::seed::{Stream, stream};
 
 /// Searches for further candidates.
@@ -167,16 +167,19 @@ fn climb(
 mod tests {
     use super::*;
     use crate::design::advice::advise;
-    use crate::experiments::statistics::Mean;
-    use crate::experiments::trial::Trial;
+    use crate::lab::trial::Trial;
     use crate::measurement::Sensor;
-    use crate::scene::{Injected, Noise, Scene, Weights};
+    use crate::measurement::Weights;
+    use crate::scene::Scene;
+    use crate::simulation::injected::{Injected, Noise};
+    use crate::statistics::Mean;
 
-    fn cell(weights: Weights, attitude_sigma_rad: f64) -> (Scene, Injected) {
+    fn cell(weights: Weights, orientation_sigma_rad: f64) -> (Scene, Injected) {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/paper.toml");
         let file = crate::scene::read(&path).unwrap();
         let mut scene = file.scene;
-        scene.sensor = Sensor { position_sigma_m: 20e-6, attitude_sigma_rad: Some(attitude_sigma_rad), ..scene.sensor.clone() };
+        scene.sensor =
+            Sensor { position_sigma_m: 20e-6, orientation_sigma_rad: Some(orientation_sigma_rad), ..scene.sensor.clone() };
         scene.weights = weights;
         let injected = Injected {
             length_error_m: 1e-3,
@@ -190,9 +193,9 @@ mod tests {
     /// Where noise is all there is, what is predicted is what comes out, whatever the fit assumes of the noise.
     #[test]
     fn the_predicted_error_is_that_of_simulated_calibrations() {
-        for (weights, attitude_sigma_rad) in [(Weights::Noise, 50e-6), (Weights::Unit, 20e-6), (Weights::Unit, 1e-3)] {
-            let (scene, injected) = cell(weights, attitude_sigma_rad);
-            let models = Models::new(&scene).unwrap();
+        for (weights, orientation_sigma_rad) in [(Weights::Noise, 50e-6), (Weights::Unit, 20e-6), (Weights::Unit, 1e-3)] {
+            let (scene, injected) = cell(weights, orientation_sigma_rad);
+            let models = Models::new(&scene.request()).unwrap();
             let rules = Rules::measurable(&scene.arm, &scene.sensor);
             let set = Sampler::new(&rules).draw(&mut stream(1, "test/prediction"), 20).unwrap();
             let predicted = models.predict(&set, scene.arm.joint_count()).unwrap();
@@ -200,25 +203,25 @@ mod tests {
             for number in 0..60 {
                 let after = Trial::new(&scene, &injected, number).unwrap().calibrate(&set).unwrap().after;
                 ratios[0].push((after.position_m.rms / predicted.position_rms_m).powi(2));
-                ratios[1].push((after.rotation_rad.unwrap().rms / predicted.attitude_rms_rad).powi(2));
+                ratios[1].push((after.rotation_rad.unwrap().rms / predicted.orientation_rms_rad).powi(2));
             }
             for ratios in ratios {
                 let Mean { mean, interval95, .. } = Mean::of(&ratios).unwrap();
-                println!("{weights:?}, {attitude_sigma_rad}: {mean} in {interval95:?}");
+                println!("{weights:?}, {orientation_sigma_rad}: {mean} in {interval95:?}");
                 // Twice the 95 % interval: four standard errors.
                 let half = mean - interval95.unwrap()[0];
                 assert!((mean - 1.0).abs() < 2.0 * half && half < 0.2, "{weights:?}: {mean} ± {half}");
             }
-            let advice = advise(&scene, &models, &rules, &set, std::slice::from_ref(&set));
+            let advice = advise(&scene.design, &models, &rules, &set, std::slice::from_ref(&set));
             // Noise that the fit does not assume has no bound.
-            assert_eq!(advice.is_ok(), weights == Weights::Noise || attitude_sigma_rad == 20e-6);
+            assert_eq!(advice.is_ok(), weights == Weights::Noise || orientation_sigma_rad == 20e-6);
         }
     }
 
     #[test]
     fn no_random_set_beats_the_bound() {
         let (scene, _) = cell(Weights::Noise, 50e-6);
-        let models = Models::new(&scene).unwrap();
+        let models = Models::new(&scene.request()).unwrap();
         let rules = Rules::measurable(&scene.arm, &scene.sensor);
         let limit = bound(&models, &rules, Criterion::IOptimality, 300).unwrap();
         assert!(limit.gap < 0.05, "{}", limit.gap);

@@ -1,10 +1,10 @@
 //! Configurations that may be measured: within the joint limits, free of collisions, and where the sensor sees them.
 
 use crate::arm::Arm;
-use crate::kinematics::ChainAt;
+use crate::arm::ChainAt;
+use crate::arm::self_collision::{self, CollisionCheck, Contact};
 use crate::measurement::Sensor;
 use crate::seed::Stream;
-use crate::self_collision::{self, CollisionCheck, Contact};
 
 /// Draws after which a cell counts as one in which the arm cannot move.
 const DRAWS: usize = 20_000;

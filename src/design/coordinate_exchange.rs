@@ -46,7 +46,7 @@ pub fn search(task: &Task<'_>, stream: &mut Stream, watch: &mut Watch<'_>) -> Re
                 best.value = value;
                 best.configurations = set.configurations().to_vec();
             }
-            watch(task.step(step, value, best.value, improved.then_some(&best.configurations)))?;
+            watch.report(task.step(step, value, best.value, improved.then_some(&best.configurations)))?;
             step += 1;
             if task.left() == 0 || value - before <= NOTHING * before.abs().min(1.0) {
                 break;

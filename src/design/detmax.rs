@@ -42,7 +42,7 @@ pub fn search(task: &Task<'_>, stream: &mut Stream, watch: &mut Watch<'_>) -> Re
                     members.iter().flat_map(|member| &pool[member * joints..(member + 1) * joints]).copied().collect();
             }
             if improved || end {
-                watch(task.step(step, value, best.value, improved.then_some(&best.configurations)))?;
+                watch.report(task.step(step, value, best.value, improved.then_some(&best.configurations)))?;
                 step += 1;
             }
             Ok(())
@@ -52,7 +52,7 @@ pub fn search(task: &Task<'_>, stream: &mut Stream, watch: &mut Watch<'_>) -> Re
     Ok(best)
 }
 
-/// Told members, value, and whether it is the last set.
+/// SearchReport members, value, and whether it is the last set.
 pub(super) type Tell<'t> = dyn FnMut(&[usize], f64, bool) -> Result<(), SearchError> + 't;
 
 /// One search from `members` of `pool` (configurations one after the other, rad or m): the members of a set that no excursion makes

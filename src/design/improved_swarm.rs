@@ -15,9 +15,9 @@ use rayon::prelude::*;
 
 use super::moves::{Record, fresh, or_worst, reflect};
 use super::outcome::StopReason;
+use super::problem::Swarm;
 use super::search::{Found, Scratch, SearchError, Task, Watch};
 use crate::arm::Arm;
-use crate::scene::Swarm;
 use crate::seed::Stream;
 
 /// Inertia at the start and at the end.

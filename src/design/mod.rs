@@ -16,6 +16,7 @@ pub mod objective;
 pub mod outcome;
 pub mod perturbation;
 mod pool;
+pub mod problem;
 pub mod search;
 pub mod swarm;
 #[cfg(test)]
@@ -23,16 +24,17 @@ mod tests;
 
 use rayon::prelude::*;
 
+use crate::progress::Stopped;
+use crate::quality::EvennessDomain;
 use crate::quality::Indexes;
 use crate::quality::evaluator::{Evaluator, Scratch};
 use crate::quality::globality::WorkspaceGrid;
-use crate::recording::event::{Event, Listener, ListenerError};
-use crate::scene::{EvennessDomain, Method, Scene};
 use crate::seed::stream;
 use candidates::{NothingMeasurable, Rules, Sampler};
 use objective::{Models, Objective};
 use outcome::{DesignOutcome, EvennessDomains, RandomReference};
-use search::{SearchError, Task, Told, finite, search, split};
+use problem::{Method, Request};
+use search::{SearchError, Task, Watch, finite, search, split};
 
 /// A design could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -42,7 +44,7 @@ pub enum DesignError {
     NothingMeasurable(#[from] NothingMeasurable),
     /// Whoever records or shows the run failed.
     #[error(transparent)]
-    Listener(#[from] ListenerError),
+    Listener(#[from] Stopped),
 }
 
 impl From<SearchError> for DesignError {
@@ -54,17 +56,16 @@ impl From<SearchError> for DesignError {
     }
 }
 
-/// Chooses the configurations of `scene` by its method and criterion, telling `listener` every step and the outcome.
+/// Chooses the configurations that `request` asks for by its method and criterion, telling `watch` every step.
 ///
 /// # Errors
-/// If no configuration may be measured, or the listener fails.
-pub fn design(scene: &Scene, listener: &mut dyn Listener) -> Result<DesignOutcome, DesignError> {
-    let arm = &scene.arm;
-    let problem = &scene.design;
-    let rules = Rules::measurable(arm, &scene.sensor);
-    let models = Models::new(scene)?;
+/// If no configuration may be measured, or the watcher stops it.
+pub fn design(request: &Request<'_>, watch: &mut Watch<'_>) -> Result<DesignOutcome, DesignError> {
+    let Request { arm, problem, .. } = *request;
+    let rules = Rules::measurable(arm, request.sensor);
+    let models = Models::new(request)?;
     let evaluator = &models.evaluator;
-    let random_sets = random_sets(scene, &rules)?;
+    let random_sets = random_sets(request, &rules)?;
     let random = reference(&random_sets, evaluator);
 
     let objective = Objective::new(&models, problem.criterion, arm.joint_count());
@@ -73,13 +74,7 @@ pub fn design(scene: &Scene, listener: &mut dyn Listener) -> Result<DesignOutcom
         _ => problem.budget,
     };
     let task = Task::new(&rules, &objective, problem.count, budget, problem.pool);
-    let mut watch = |told: Told| {
-        listener.take(&match told {
-            Told::Swarm(iteration) => Event::Swarm(iteration),
-            Told::Step(step) => Event::Search(step),
-        })
-    };
-    let found = search(problem.method, &task, &problem.swarm, &mut stream(scene.seed, "design/choose"), &mut watch)?;
+    let found = search(problem.method, &task, &problem.swarm, &mut stream(request.seed, "design/choose"), watch)?;
 
     let mut scratch = Scratch::default();
     let indexes = evaluator.evaluate(&found.configurations, &mut scratch);
@@ -92,8 +87,8 @@ pub fn design(scene: &Scene, listener: &mut dyn Listener) -> Result<DesignOutcom
             WorkspaceGrid::new(arm, domain, problem.evenness_step_m).evenness(end_points)
         }
     };
-    let advice = advice::advise(scene, &models, &rules, &found.configurations, &random_sets);
-    let outcome = DesignOutcome {
+    let advice = advice::advise(problem, &models, &rules, &found.configurations, &random_sets);
+    Ok(DesignOutcome {
         method: problem.method.name().to_owned(),
         criterion: problem.criterion.name().to_owned(),
         value: finite(found.value),
@@ -111,27 +106,24 @@ pub fn design(scene: &Scene, listener: &mut dyn Listener) -> Result<DesignOutcom
         evaluations: task.evaluations(),
         rejections: task.rejections(),
         stop: found.stop,
-    };
-    listener.take(&Event::Designed(outcome.clone()))?;
-    Ok(outcome)
+    })
 }
 
-/// Configurations that verify: uniform within the limits and the rules, from a stream of their own.
+/// `count` configurations that verify: uniform within the limits and the rules, from a stream of their own. `exact`: an exact
+/// reference reads them, which sees everything; a sensor's readings must be within its view.
 ///
 /// # Errors
 /// If no configuration is free of collisions.
-pub fn held_out(scene: &Scene) -> Result<Vec<Vec<f64>>, NothingMeasurable> {
-    // An exact reference sees everything; a sensor's readings must be within its view.
-    let rules =
-        if scene.plan.held_out_exact { Rules::reachable(&scene.arm) } else { Rules::measurable(&scene.arm, &scene.sensor) };
-    let drawn = Sampler::new(&rules).draw(&mut stream(scene.seed, "plan/held_out"), scene.plan.held_out_count)?;
-    Ok(split(&drawn, scene.arm.joint_count()))
+pub fn held_out(request: &Request<'_>, count: usize, exact: bool) -> Result<Vec<Vec<f64>>, NothingMeasurable> {
+    let rules = if exact { Rules::reachable(request.arm) } else { Rules::measurable(request.arm, request.sensor) };
+    let drawn = Sampler::new(&rules).draw(&mut stream(request.seed, "plan/held_out"), count)?;
+    Ok(split(&drawn, request.arm.joint_count()))
 }
 
-fn random_sets(scene: &Scene, rules: &Rules<'_>) -> Result<Vec<Vec<f64>>, NothingMeasurable> {
+fn random_sets(request: &Request<'_>, rules: &Rules<'_>) -> Result<Vec<Vec<f64>>, NothingMeasurable> {
     let mut sampler = Sampler::new(rules);
-    (0..scene.design.random_sets)
-        .map(|set| sampler.draw(&mut stream(scene.seed, &format!("design/random/{set}")), scene.design.count))
+    (0..request.problem.random_sets)
+        .map(|set| sampler.draw(&mut stream(request.seed, &format!("design/random/{set}")), request.problem.count))
         .collect()
 }
 

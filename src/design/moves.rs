@@ -58,7 +58,7 @@ impl<'t, 'a> Record<'t, 'a> {
 
     fn tell_now(&mut self, here: f64, watch: &mut Watch<'_>) -> Result<(), SearchError> {
         let improved = (!self.told).then_some(self.configurations.as_slice());
-        watch(self.task.step(self.step, here, self.value, improved))?;
+        watch.report(self.task.step(self.step, here, self.value, improved))?;
         self.step += 1;
         self.told = true;
         Ok(())

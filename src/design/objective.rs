@@ -3,13 +3,13 @@
 use nalgebra::Vector3;
 
 use super::candidates::{NothingMeasurable, Rules, Sampler};
+use super::problem::{Criterion, Request};
 use crate::quality::dense;
 use crate::quality::evaluator::{Evaluator, comprehensive};
 use crate::quality::globality::dispersion;
 use crate::quality::information::{InformationModel, JacobianScratch};
 use crate::quality::observability::observability;
 use crate::quality::prediction::{Prediction, PredictionWorkspace};
-use crate::scene::{Criterion, Scene};
 use crate::seed::stream;
 
 /// Configurations that stand for the workspace.
@@ -31,18 +31,20 @@ pub struct Models {
     pub workspace: PredictionWorkspace,
     /// Diagonal of the ridge.
     ridge: Vec<f64>,
+    joint_count: usize,
 }
 
 impl Models {
-    /// Models of `scene`'s arm, sensor and weights.
+    /// Models of the arm, the sensor and the weights of `request`.
     ///
     /// # Errors
     /// If every configuration collides.
-    pub fn new(scene: &Scene) -> Result<Self, NothingMeasurable> {
-        let (arm, problem) = (&scene.arm, &scene.design);
-        let attitude = scene.sensor.attitude_sigma_rad.is_some();
-        let evaluator = Evaluator::new(arm, attitude, problem.evenness_domain, problem.evenness_step_m, problem.jacobian_scaling);
-        let information = InformationModel::new(arm, &scene.sensor, scene.weights);
+    pub fn new(request: &Request<'_>) -> Result<Self, NothingMeasurable> {
+        let Request { arm, sensor, problem, .. } = *request;
+        let orientation = sensor.orientation_sigma_rad.is_some();
+        let evaluator =
+            Evaluator::new(arm, orientation, problem.evenness_domain, problem.evenness_step_m, problem.jacobian_scaling);
+        let information = InformationModel::new(arm, sensor, request.weights);
         let rules = Rules::reachable(arm);
         // A property of the arm, like the grid of the evenness: the same whatever the scene's seed.
         let points = Sampler::new(&rules).draw(&mut stream(0, "quality/prediction"), WORKSPACE_POINTS)?;
@@ -59,7 +61,13 @@ impl Models {
                 }
             }
         }
-        Ok(Models { evaluator, information, workspace, ridge })
+        Ok(Models { evaluator, information, workspace, ridge, joint_count: arm.joint_count() })
+    }
+
+    /// Joints of the arm.
+    #[must_use]
+    pub fn joint_count(&self) -> usize {
+        self.joint_count
     }
 
     /// What `configurations` (one after the other, rad or m) let expect of a model calibrated with them; `None` where they do not

@@ -11,10 +11,10 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::objective::{ObjectiveScratch, Set};
+use super::problem::Criterion;
 use super::search::Task;
 use crate::quality::dense;
 use crate::quality::information::Blocks;
-use crate::scene::Criterion;
 
 /// Changes after which V and W are computed anew, so that rounding does not pile up.
 const REFRESH: usize = 64;

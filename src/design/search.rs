@@ -11,9 +11,9 @@ use rayon::prelude::*;
 use super::candidates::{NothingMeasurable, Rules, RulesScratch, Sampler};
 use super::objective::{Objective, ObjectiveScratch, Set};
 use super::outcome::{SearchStep, StopReason, SwarmIteration};
+use super::problem::{Method, Swarm};
 use crate::arm::Arm;
-use crate::recording::event::ListenerError;
-use crate::scene::{Method, Swarm};
+use crate::progress::{Progress, Stopped};
 use crate::seed::Stream;
 
 /// A search for a set of configurations.
@@ -40,12 +40,12 @@ pub enum SearchError {
     NothingMeasurable(#[from] NothingMeasurable),
     /// Whoever watches refused a step.
     #[error(transparent)]
-    Watcher(#[from] ListenerError),
+    Watcher(#[from] Stopped),
 }
 
 /// What a search tells.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Told {
+pub enum SearchReport {
     /// The paper's swarm, in all its particles.
     Swarm(SwarmIteration),
     /// A step of any other method.
@@ -53,7 +53,7 @@ pub enum Told {
 }
 
 /// Whoever watches a search.
-pub type Watch<'w> = dyn FnMut(Told) -> Result<(), ListenerError> + 'w;
+pub type Watch<'w> = dyn Progress<SearchReport> + 'w;
 
 /// What a search found.
 #[derive(Clone, Debug, PartialEq)]
@@ -151,8 +151,8 @@ impl<'a> Task<'a> {
 
     /// A step to tell; `improved` where `best` is better than any told before.
     #[must_use]
-    pub fn step(&self, step: usize, value: f64, best: f64, improved: Option<&[f64]>) -> Told {
-        Told::Step(SearchStep {
+    pub fn step(&self, step: usize, value: f64, best: f64, improved: Option<&[f64]>) -> SearchReport {
+        SearchReport::Step(SearchStep {
             step,
             evaluations: self.evaluations(),
             budget: self.budget,
@@ -202,7 +202,7 @@ pub fn search(
         Method::Random => {
             let configurations = task.draw(stream, task.count)?;
             let value = task.value(&configurations, &mut Scratch::default());
-            watch(task.step(0, value, value, Some(&configurations)))?;
+            watch.report(task.step(0, value, value, Some(&configurations)))?;
             Ok(Found { configurations, value, stop: StopReason::Drawn })
         }
     }

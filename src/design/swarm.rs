@@ -12,10 +12,10 @@
 use rayon::prelude::*;
 
 use super::outcome::{StopReason, SwarmIteration};
-use super::search::{Found, Scratch, SearchError, Task, Told, Watch, finite, split};
+use super::problem::Swarm;
+use super::search::{Found, Scratch, SearchError, SearchReport, Task, Watch, finite, split};
 use crate::quality::Indexes;
 use crate::quality::evaluator;
-use crate::scene::Swarm;
 use crate::seed::Stream;
 
 struct Particle {
@@ -97,7 +97,7 @@ pub fn search(task: &Task<'_>, settings: &Swarm, stream: &mut Stream, watch: &mu
         if improved {
             swarm_indexes = indexes(&swarm_best);
         }
-        watch(Told::Swarm(SwarmIteration {
+        watch.report(SearchReport::Swarm(SwarmIteration {
             iteration,
             iterations,
             fitness: particles.iter().map(|particle| particle.value).collect(),
@@ -170,7 +170,8 @@ mod tests {
     use super::*;
     use crate::design::candidates::Rules;
     use crate::design::objective::{Models, Objective};
-    use crate::scene::{Criterion, SceneFile};
+    use crate::design::problem::Criterion;
+    use crate::scene::SceneFile;
     use crate::seed::stream;
 
     fn cell() -> SceneFile {
@@ -181,14 +182,14 @@ mod tests {
     fn swarm() -> (Found, Vec<SwarmIteration>, [u64; 2]) {
         let file = cell();
         let scene = &file.scene;
-        let models = Models::new(scene).unwrap();
+        let models = Models::new(&scene.request()).unwrap();
         let objective = Objective::new(&models, Criterion::Comprehensive, scene.arm.joint_count());
         let rules = Rules::measurable(&scene.arm, &scene.sensor);
         let task = Task::new(&rules, &objective, 10, u64::MAX, 1);
         let settings = Swarm { particles: 6, iterations: 15, ..scene.design.swarm.clone() };
         let mut told = Vec::new();
-        let mut watch = |step: Told| {
-            let Told::Swarm(iteration) = step else { panic!("a swarm tells iterations") };
+        let mut watch = |step: SearchReport| {
+            let SearchReport::Swarm(iteration) = step else { panic!("a swarm tells iterations") };
             told.push(iteration);
             Ok(())
         };

@@ -4,8 +4,9 @@ use super::candidates::Rules;
 use super::objective::{Models, Objective};
 use super::outcome::StopReason;
 use super::pool::PoolSet;
-use super::search::{Found, Task, Told, search};
-use crate::scene::{Criterion, Method, Scene, Swarm};
+use super::search::{Found, SearchReport, Task, search};
+use crate::design::problem::{Criterion, Method, Swarm};
+use crate::scene::Scene;
 use crate::seed::stream;
 
 const COUNT: usize = 9;
@@ -32,14 +33,14 @@ fn run(method: Method, criterion: Criterion, scene: &Scene, models: &Models, cou
     let objective = Objective::new(models, criterion, scene.arm.joint_count());
     let task = Task::new(&rules, &objective, count, budget, POOL);
     let (mut bests, mut told) = (Vec::new(), Vec::new());
-    let mut watch = |step: Told| {
+    let mut watch = |step: SearchReport| {
         let (best, configurations, evaluations) = match step {
             // The swarm tells the indexes of its best; the criterion's value is that of its best particle.
-            Told::Swarm(step) => {
+            SearchReport::Swarm(step) => {
                 let best = step.personal_best.iter().copied().fold(f64::NEG_INFINITY, f64::max);
                 (best, step.best_configurations, step.evaluations)
             }
-            Told::Step(step) => (step.best, step.best_configurations, step.evaluations),
+            SearchReport::Step(step) => (step.best, step.best_configurations, step.evaluations),
         };
         assert_eq!(evaluations, task.evaluations());
         bests.push(best);
@@ -54,7 +55,7 @@ fn run(method: Method, criterion: Criterion, scene: &Scene, models: &Models, cou
 #[test]
 fn every_method_keeps_to_the_task() {
     let scene = scene("arm8.toml");
-    let models = Models::new(&scene).unwrap();
+    let models = Models::new(&scene.request()).unwrap();
     let rules = Rules::measurable(&scene.arm, &scene.sensor);
     let joints = scene.arm.joint_count();
     let within =
@@ -100,7 +101,7 @@ fn every_method_keeps_to_the_task() {
 #[test]
 fn sets_that_determine_nothing_and_budgets_of_nothing_do_no_harm() {
     let scene = scene("paper.toml");
-    let models = Models::new(&scene).unwrap();
+    let models = Models::new(&scene.request()).unwrap();
     // Two configurations never determine the parameters: every O3 is zero, and all information is the ridge's.
     for criterion in [Criterion::O3, Criterion::DOptimality] {
         for (method, budget) in Method::ALL.into_iter().flat_map(|method| [0, 1, 7, 150].map(|budget| (method, budget))) {
@@ -124,7 +125,7 @@ fn two_joints() -> Scene {
 #[test]
 fn methods_come_close_to_a_dispersion_that_is_known() {
     let scene = two_joints();
-    let models = Models::new(&scene).unwrap();
+    let models = Models::new(&scene.request()).unwrap();
     let rules = Rules::measurable(&scene.arm, &scene.sensor);
     // Radius² and height of the circles on which end points may lie. All points of a set with the greatest dispersion lie about
     // the axis: on two circles, k of 8 on one, the dispersion is the mean radius² and the variance of the height.
@@ -164,7 +165,7 @@ fn methods_come_close_to_a_dispersion_that_is_known() {
 fn the_pools_formulas_are_what_sets_are_worth() {
     for name in ["arm8.toml", "paper.toml"] {
         let scene = scene(name);
-        let models = Models::new(&scene).unwrap();
+        let models = Models::new(&scene.request()).unwrap();
         let rules = Rules::measurable(&scene.arm, &scene.sensor);
         let joints = scene.arm.joint_count();
         for criterion in [Criterion::DOptimality, Criterion::IOptimality] {

@@ -33,7 +33,7 @@ pub(super) fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], power: &Det
             say("harmonics of a joint: move it through its whole travel, other joints at rest");
         }
         if has("base_step") || has("tool_step") {
-            say("base or tool: read the same few configurations again with another attitude of the tool");
+            say("base or tool: read the same few configurations again with another orientation of the tool");
         }
         if has("unknown") {
             say("a shape without a name: more configurations where it shows");

@@ -32,10 +32,10 @@ pub(super) fn matrix(rows: &Rows, conditions: &Conditions, hypotheses: Vec<Hypot
     raw.columns_mut(0, geometry).copy_from(&rows.jacobian);
     raw.set_column(geometry + columns, &rows.residual);
     let unit: Vec<f64> = hypotheses.iter().map(|hypothesis| libm::sqrt(hypothesis.range[0] * hypothesis.range[1])).collect();
-    let attitude = rows.per_row == 6;
+    let orientation = rows.per_row == 6;
     for (row, reading) in conditions.readings.iter().enumerate() {
         for (number, hypothesis) in hypotheses.iter().enumerate() {
-            for (at, column) in hypothesis.shape.columns(reading, attitude).iter().enumerate() {
+            for (at, column) in hypothesis.shape.columns(reading, orientation).iter().enumerate() {
                 let factor = unit[number] * hypothesis.spread[at];
                 for equation in 0..rows.per_row {
                     raw[(row * rows.per_row + equation, geometry + first[number] + at)] = column[equation] * factor;

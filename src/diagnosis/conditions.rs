@@ -156,7 +156,7 @@ pub fn conditions(measurements: &[&Measurement], rows: &Rows) -> Conditions {
     let columns = Columns {
         approach,
         temperature,
-        attitude: rows.per_row == 6,
+        orientation: rows.per_row == 6,
         time,
         rows: total,
         travel,

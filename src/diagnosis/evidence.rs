@@ -15,7 +15,7 @@ pub const SCALES: [(f64, f64); 3] = [(1.0, 0.45), (2.5, 0.45), (12.0, 0.10)];
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoisePrior {
     /// Degrees of freedom.
-    pub freedom: f64,
+    pub degrees_of_freedom: f64,
     /// Mean square over the declared one.
     pub level: f64,
 }
@@ -160,9 +160,9 @@ fn solve(surviving: &Surviving, candidates: &Candidates, members: &[(usize, usiz
 
 /// Logarithm of the evidence over that of no effect.
 fn log_ratio(surviving: &Surviving, noise: NoisePrior, drop: f64, log_determinant: f64) -> f64 {
-    let before = noise.freedom * noise.level + surviving.residual;
+    let before = noise.degrees_of_freedom * noise.level + surviving.residual;
     let after = (before - drop).max(1e-9 * before);
-    -0.5 * log_determinant - 0.5 * (noise.freedom + surviving.freedom) * libm::log(after / before)
+    -0.5 * log_determinant - 0.5 * (noise.degrees_of_freedom + surviving.degrees_of_freedom) * libm::log(after / before)
 }
 
 /// Logarithm of the share of the posterior that physics allows, over that of the prior (a half).
@@ -199,7 +199,8 @@ pub fn log_posterior(surviving: &Surviving, candidates: &Candidates, noise: Nois
 }
 
 fn level(surviving: &Surviving, noise: NoisePrior, drop: f64) -> f64 {
-    (noise.freedom * noise.level + surviving.residual - drop).max(1e-12) / (noise.freedom + surviving.freedom)
+    (noise.degrees_of_freedom * noise.level + surviving.residual - drop).max(1e-12)
+        / (noise.degrees_of_freedom + surviving.degrees_of_freedom)
 }
 
 /// Posterior mean of the noise's mean square beside `members`, in declared sigmas.

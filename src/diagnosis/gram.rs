@@ -26,7 +26,7 @@ pub struct Surviving {
     /// Of the residual with itself.
     pub residual: f64,
     /// Equations that the geometry leaves.
-    pub freedom: f64,
+    pub degrees_of_freedom: f64,
     /// The geometry's change per unit of each signature and, last, of the residual: `(JᵀJ + 1)⁻¹ Jᵀ [S r]`.
     pub absorbed: DMatrix<f64>,
 }
@@ -59,7 +59,7 @@ impl Gram {
             products: left.view((0, 0), (last, last)).into_owned(),
             with_residual: left.view((0, last), (last, 1)).column(0).into_owned(),
             residual: (left[(last, last)] + offset.norm_squared()).max(1e-12),
-            freedom: absorbing.freedom,
+            degrees_of_freedom: absorbing.degrees_of_freedom,
             absorbed: absorbing.absorbed,
         })
     }
@@ -94,7 +94,7 @@ impl Surviving {
             products,
             with_residual: DVector::from_fn(last, |column, _| product(column, last)),
             residual: (product(last, last) + offset.norm_squared()).max(1e-12),
-            freedom: absorbing.freedom,
+            degrees_of_freedom: absorbing.degrees_of_freedom,
             absorbed: absorbing.absorbed,
         })
     }
@@ -107,7 +107,7 @@ struct Absorbing {
     /// As in [`Surviving`].
     absorbed: DMatrix<f64>,
     /// Equations that it leaves.
-    freedom: f64,
+    degrees_of_freedom: f64,
 }
 
 impl Absorbing {
@@ -122,6 +122,6 @@ impl Absorbing {
         let absorbed = cholesky.solve(&mixed);
         let inverse = cholesky.inverse();
         let pinned: f64 = (0..count).map(|i| inverse[(i, i)]).sum();
-        Some(Absorbing { mixed, absorbed, freedom: (equations - (count as f64 - pinned)).max(1.0) })
+        Some(Absorbing { mixed, absorbed, degrees_of_freedom: (equations - (count as f64 - pinned)).max(1.0) })
     }
 }

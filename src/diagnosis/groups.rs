@@ -5,7 +5,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::conditions::centre;
 use super::outliers::{MEDIAN, RARE};
-use crate::frames::rotation_vector;
+use crate::arm::frames::rotation_vector;
 use crate::measurement::Measurement;
 
 /// Joint readings that differ by less are of one configuration, rad or m: commanded values come back rounded, or as encoders see them.
@@ -31,10 +31,10 @@ pub struct Groups {
 pub struct Repeats {
     /// One sigma per axis, m.
     pub position_m: f64,
-    /// One sigma of an attitude about an axis, rad, where attitudes were read.
-    pub attitude_rad: Option<f64>,
+    /// One sigma of an orientation about an axis, rad, where orientations were read.
+    pub orientation_rad: Option<f64>,
     /// Degrees of freedom.
-    pub freedom: f64,
+    pub degrees_of_freedom: f64,
     /// Whether the arm moved between the readings: if not, they show the sensor alone.
     pub moved: bool,
 }
@@ -146,11 +146,12 @@ pub fn repeats(measurements: &[&Measurement], groups: &Groups) -> Option<Repeats
                 }
             }
             let points = |rows: &[usize]| rows.iter().map(|row| measurements[*row].position().coords).collect::<Vec<_>>();
-            // From the attitude of the first.
+            // From the orientation of the first.
             let turns = |rows: &[usize]| -> Vec<Vector3<f64>> {
-                let attitudes: Option<Vec<UnitQuaternion<f64>>> = rows.iter().map(|row| measurements[*row].attitude()).collect();
-                let attitudes = attitudes.unwrap_or_default();
-                attitudes.iter().map(|attitude| rotation_vector(&(attitudes[0].inverse() * attitude))).collect()
+                let orientations: Option<Vec<UnitQuaternion<f64>>> =
+                    rows.iter().map(|row| measurements[*row].orientation()).collect();
+                let orientations = orientations.unwrap_or_default();
+                orientations.iter().map(|orientation| rotation_vector(&(orientations[0].inverse() * orientation))).collect()
             };
             for visit in &visits {
                 of_visits.extend(contrasts(&points(visit)));
@@ -171,13 +172,13 @@ pub fn repeats(measurements: &[&Measurement], groups: &Groups) -> Option<Repeats
         sorted.sort_by(f64::total_cmp);
         let level = sorted[sorted.len() / 2] / MEDIAN[0];
         let good: Vec<f64> = sorted.into_iter().filter(|square| *square <= RARE[0] * level).collect();
-        let freedom = 3.0 * good.len() as f64;
-        let mean = good.iter().sum::<f64>() / freedom;
-        (mean > 0.0).then(|| (libm::sqrt(mean), freedom))
+        let degrees_of_freedom = 3.0 * good.len() as f64;
+        let mean = good.iter().sum::<f64>() / degrees_of_freedom;
+        (mean > 0.0).then(|| (libm::sqrt(mean), degrees_of_freedom))
     };
     let noise = |squares: &[f64], turns: &[f64], moved: bool| {
-        let (position_m, freedom) = sigma(squares)?;
-        Some(Repeats { position_m, attitude_rad: sigma(turns).map(|(sigma, _)| sigma), freedom, moved })
+        let (position_m, degrees_of_freedom) = sigma(squares)?;
+        Some(Repeats { position_m, orientation_rad: sigma(turns).map(|(sigma, _)| sigma), degrees_of_freedom, moved })
     };
     noise(&between, &turns_between, true).or_else(|| noise(&of_visits, &turns_of_visits, false))
 }
@@ -199,7 +200,7 @@ fn contrasts(points: &[Vector3<f64>]) -> Vec<f64> {
 pub fn weights(groups: &Groups, residual: &[f64], per_row: usize, good: &[bool]) -> (Vec<f64>, f64) {
     let of = |row: usize| &residual[row * per_row..(row + 1) * per_row];
     // Analysis of variance: within groups, and all.
-    let (mut within, mut freedom, mut all, mut count) = (0.0, 0.0, 0.0, 0.0);
+    let (mut within, mut degrees_of_freedom, mut all, mut count) = (0.0, 0.0, 0.0, 0.0);
     for rows in &groups.rows {
         let rows: Vec<usize> = rows.iter().copied().filter(|row| good[*row]).collect();
         if rows.len() < 2 {
@@ -213,14 +214,17 @@ pub fn weights(groups: &Groups, residual: &[f64], per_row: usize, good: &[bool])
                 all += value * value;
             }
         }
-        freedom += (rows.len() - 1) as f64;
+        degrees_of_freedom += (rows.len() - 1) as f64;
         count += rows.len() as f64;
     }
-    if freedom == 0.0 {
+    if degrees_of_freedom == 0.0 {
         return (vec![1.0; groups.of.len()], 0.0);
     }
-    let correlation =
-        if freedom < PAIRS || all <= 0.0 { 0.5 } else { (1.0 - (within / freedom) / (all / count)).clamp(0.0, 1.0) };
+    let correlation = if degrees_of_freedom < PAIRS || all <= 0.0 {
+        0.5
+    } else {
+        (1.0 - (within / degrees_of_freedom) / (all / count)).clamp(0.0, 1.0)
+    };
     let weight = |row: usize| 1.0 / (1.0 + (groups.rows[groups.of[row]].len() - 1) as f64 * correlation);
     ((0..groups.of.len()).map(weight).collect(), correlation)
 }
@@ -242,7 +246,7 @@ mod tests {
             let mut point = row(index, 0.01 * (index % 40) as f64 + 1e-5 * stream.normal(), 0.0);
             point.position_m = [0, 1, 2].map(|_| 20e-6 * stream.normal());
             let turn = Vector3::from_fn(|_, _| 5e-5 * stream.normal());
-            point.attitude_xyzw = Some(UnitQuaternion::from_scaled_axis(turn).coords.into());
+            point.orientation_xyzw = Some(UnitQuaternion::from_scaled_axis(turn).coords.into());
             // A few are two millimetres off, as in a real file.
             if index % 100 == 7 {
                 point.position_m[0] += 2e-3;
@@ -254,8 +258,8 @@ mod tests {
         assert_eq!(groups.rows.len(), 40);
         let found = repeats(&rows, &groups).unwrap();
         assert!(found.moved && (found.position_m / 20e-6 - 1.0).abs() < 0.05, "{found:?}");
-        assert!(found.freedom > 950.0);
-        assert!((found.attitude_rad.unwrap() / 5e-5 - 1.0).abs() < 0.05, "{found:?}");
+        assert!(found.degrees_of_freedom > 950.0);
+        assert!((found.orientation_rad.unwrap() / 5e-5 - 1.0).abs() < 0.05, "{found:?}");
     }
 
     #[test]

@@ -30,8 +30,8 @@ pub(super) fn magnitude(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -
     let at: Vec<usize> = columns.take(width).filter_map(|column| fit.columns.iter().position(|known| *known == column)).collect();
     let value = |i: usize| fit.coefficients[at[i]] * unit * of.spread[i];
     let covariance = |i: usize, j: usize| fit.noise * fit.covariance[(at[i], at[j])] * unit * unit * of.spread[i] * of.spread[j];
-    let freedom = (analysis.surviving.freedom + analysis.noise.freedom).max(1.0);
-    let quantile = StudentsT::new(0.0, 1.0, freedom).map_or(1.96, |student| student.inverse_cdf(0.975));
+    let degrees_of_freedom = (analysis.surviving.degrees_of_freedom + analysis.noise.degrees_of_freedom).max(1.0);
+    let quantile = StudentsT::new(0.0, 1.0, degrees_of_freedom).map_or(1.96, |student| student.inverse_cdf(0.975));
     let name = of.kind.map_or("", Kind::unit).to_owned();
     let load = matches!(of.kind, Some(Kind::JointCompliance | Kind::LinkBending)) && !analysis.rows.mechanism.masses_known;
     let name = if load { "relative (no masses)".to_owned() } else { name };

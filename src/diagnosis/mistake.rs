@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::arm::Arm;
+use crate::arm::frames::registration;
 use crate::effects::signature::posture::Mechanism;
-use crate::frames::registration;
 use crate::measurement::Measurement;
 
 /// A mistake is worth naming if mending it leaves less than this share.

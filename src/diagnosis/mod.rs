@@ -114,8 +114,8 @@ struct Around {
     ripples: Vec<Ripple>,
     /// Joints that do not repeat.
     scatter: Vec<Scatter>,
-    /// Noise of the attitudes over what is said of it, beside that of the positions.
-    attitude: f64,
+    /// Noise of the orientations over what is said of it, beside that of the positions.
+    orientation: f64,
 }
 
 impl Around {
@@ -128,7 +128,7 @@ impl Around {
             members: Vec::new(),
             ripples: Vec::new(),
             scatter: Vec::new(),
-            attitude: 1.0,
+            orientation: 1.0,
         }
     }
 
@@ -157,8 +157,8 @@ pub(crate) struct Analysis<'a> {
     pub(crate) outliers: outliers::Outliers,
     /// Joints that do not repeat.
     pub(crate) scatter: Vec<Scatter>,
-    /// Noise of the attitudes over what was said of it.
-    pub(crate) attitude: f64,
+    /// Noise of the orientations over what was said of it.
+    pub(crate) orientation: f64,
     pub(crate) maps: Vec<outcome::Map>,
     pub(crate) residuals: Vec<outcome::Residual>,
     /// Of each row, which member of the best set moves it most.
@@ -193,8 +193,8 @@ pub fn diagnose(
     let repeats = groups::repeats(measurements, &groups);
     let sigma_m = sensor.mean_position_sigma(measurements.iter().copied());
     let noise = noise_prior(repeats, sigma_m, options.noise);
-    let by_repeats = weights::attitude_of_repeats(sensor, repeats, sigma_m);
-    let mut around = Around { attitude: by_repeats.unwrap_or(1.0), ..Around::nominal(total) };
+    let by_repeats = weights::orientation_of_repeats(sensor, repeats, sigma_m);
+    let mut around = Around { orientation: by_repeats.unwrap_or(1.0), ..Around::nominal(total) };
     let (mut last, mut looks) = (PASSES - 1, 0);
     let mut plain = None;
     // Around the arm as it is with the effects found so far, until nothing changes: signatures are those of the fitted arm, readings
@@ -202,8 +202,8 @@ pub fn diagnose(
     for pass in 0.. {
         let weights: Vec<f64> = around.dependent.iter().zip(&around.far).map(|(a, b)| a * b).collect();
         let (displacement, scatter) = (&around.displacement, &around.scatter);
-        let attitude_sigma_rad = sensor.attitude_sigma_rad.map(|sigma| sigma * around.attitude);
-        let sensor = &Sensor { attitude_sigma_rad, ..sensor.clone() };
+        let orientation_sigma_rad = sensor.orientation_sigma_rad.map(|sigma| sigma * around.orientation);
+        let sensor = &Sensor { orientation_sigma_rad, ..sensor.clone() };
         let rows = rows::fit(arm, Readings { sensor, measurements, weights: &weights, displacement, scatter })?;
         let conditions = conditions::conditions(measurements, &rows);
         let hypotheses = options.hypotheses(&rows, &conditions, &around.ripples);
@@ -221,7 +221,7 @@ pub fn diagnose(
         let residual = problem.left(&surviving, &coefficients);
         let weighed = weights::weigh(&rows, &residual, &weights, &groups);
         let may_tell = pass < last && scatter.is_empty() && by_repeats.is_none();
-        let ratio = weights::attitude_over_position(&rows, &residual, around.attitude != 1.0).filter(|_| may_tell);
+        let ratio = weights::orientation_over_position(&rows, &residual, around.orientation != 1.0).filter(|_| may_tell);
         let mut members: Vec<(usize, usize)> = found.best.members.clone();
         members.sort_unstable();
         let settled = around.is_settled(&weighed, &members);
@@ -235,7 +235,7 @@ pub fn diagnose(
             let displacement = displaced(&problem, &rows, &coefficients);
             around = around.next(weighed, displacement, members);
             around.ripples.extend(more);
-            around.attitude *= ratio.unwrap_or(1.0);
+            around.orientation *= ratio.unwrap_or(1.0);
             continue;
         }
         let mut outliers = outliers::look(&weighed.squares, rows.per_row);
@@ -259,7 +259,7 @@ pub fn diagnose(
         let comes_again = repeats.is_some_and(|repeats| repeats.moved) && weighed.correlation > ALIKE;
         let may_scatter = looks < LOOKS && options.only.is_none() && !comes_again;
         // Repeats between which the arm moved have the scatter in them.
-        let of_sensor = NoisePrior { freedom: noise.freedom.min(UNMOVED), ..noise };
+        let of_sensor = NoisePrior { degrees_of_freedom: noise.degrees_of_freedom.min(UNMOVED), ..noise };
         let looked = may_scatter
             .then(|| scatter::look(&rows, &problem, &surviving, &candidates, of_sensor, &found, !around.scatter.is_empty()));
         if let Some(scatter) = looked.filter(|scatter| !scatter::alike(scatter, &around.scatter)) {
@@ -307,7 +307,7 @@ pub fn diagnose(
             structure,
             outliers,
             scatter: around.scatter,
-            attitude: around.attitude,
+            orientation: around.orientation,
             maps,
             residuals,
             moved,
@@ -371,10 +371,10 @@ fn noise_prior(repeats: Option<Repeats>, declared_m: f64, source: NoiseSource) -
         (Some(repeats), _) => {
             let level = (repeats.position_m / declared_m) * (repeats.position_m / declared_m);
             // Without a move between them they say little about the arm.
-            NoisePrior { freedom: repeats.freedom.min(if repeats.moved { 20.0 } else { UNMOVED }), level }
+            NoisePrior { degrees_of_freedom: repeats.degrees_of_freedom.min(if repeats.moved { 20.0 } else { UNMOVED }), level }
         }
-        (None, NoiseSource::Assumed) => NoisePrior { freedom: 1.0, level: 1.0 },
-        (None, _) => NoisePrior { freedom: 10.0, level: 1.0 },
+        (None, NoiseSource::Assumed) => NoisePrior { degrees_of_freedom: 1.0, level: 1.0 },
+        (None, _) => NoisePrior { degrees_of_freedom: 10.0, level: 1.0 },
     }
 }
 

@@ -33,16 +33,16 @@ pub(super) fn notes(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFloo
         notes.push(format!(
             "the noise is that of repeats: {:.0} differences between readings of one configuration that agree in all that was recorded \
              (±{:.0} %)",
-            repeats.freedom / 3.0,
-            100.0 / libm::sqrt(2.0 * repeats.freedom)
+            repeats.degrees_of_freedom / 3.0,
+            100.0 / libm::sqrt(2.0 * repeats.degrees_of_freedom)
         ));
     }
-    if let (true, Some(sigma)) = (analysis.attitude != 1.0, analysis.sensor.attitude_sigma_rad) {
+    if let (true, Some(sigma)) = (analysis.orientation != 1.0, analysis.sensor.orientation_sigma_rad) {
         notes.push(format!(
-            "attitudes are taken to be read to {:.4}°, not to {:.4}° as is said of them: so much is left of them beside what is left of the \
+            "orientations are taken to be read to {:.4}°, not to {:.4}° as is said of them: so much is left of them beside what is left of the \
              positions",
             (sigma * libm::sqrt(level)).to_degrees(),
-            (sigma / analysis.attitude).to_degrees()
+            (sigma / analysis.orientation).to_degrees()
         ));
     }
     let left = rms_m(analysis, |row| row.after_m);

@@ -77,7 +77,7 @@ pub enum Verdict {
 pub struct NoiseFloor {
     /// m.
     pub position_m: f64,
-    /// rad; absent where no attitudes are measured.
+    /// rad; absent where no orientations are measured.
     pub rotation_rad: Option<f64>,
     /// Where it comes from.
     pub source: NoiseSource,

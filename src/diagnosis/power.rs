@@ -321,8 +321,8 @@ impl<'a> Bench<'a> {
             signal: Vec::new(),
             noise: Vec::new(),
             draws: Vec::new(),
-            half: 0.5 * (self.prior.freedom + self.surviving.freedom),
-            pinned: self.prior.freedom * self.prior.level,
+            half: 0.5 * (self.prior.degrees_of_freedom + self.surviving.degrees_of_freedom),
+            pinned: self.prior.degrees_of_freedom * self.prior.level,
         };
         self.draw(&mut world, &products, &factor, &axes, number, count);
         Some(world)
@@ -362,7 +362,7 @@ impl<'a> Bench<'a> {
                 normal[i] += (pool.along - along) * own[i] * factor[(i, i)] / length;
             }
             let mut squares: f64 = normal.iter().map(|value| value * value).sum();
-            squares += chi_square(self.surviving.freedom - size as f64, pool.rest);
+            squares += chi_square(self.surviving.degrees_of_freedom - size as f64, pool.rest);
             let mut cross = 0.0;
             let mut first = 0;
             for i in 0..size {
@@ -399,13 +399,13 @@ fn towards(direction: &mut [f64], signed: bool, pool: &Pool) {
 }
 
 /// χ² with so many degrees of freedom where a standard normal is `normal` (Wilson and Hilferty).
-fn chi_square(freedom: f64, normal: f64) -> f64 {
-    if freedom < 1.0 {
+fn chi_square(degrees_of_freedom: f64, normal: f64) -> f64 {
+    if degrees_of_freedom < 1.0 {
         return 0.0;
     }
-    let part = 2.0 / (9.0 * freedom);
+    let part = 2.0 / (9.0 * degrees_of_freedom);
     let root = 1.0 - part + normal * libm::sqrt(part);
-    freedom * (root * root * root).max(0.0)
+    degrees_of_freedom * (root * root * root).max(0.0)
 }
 
 /// The factor of a matrix that rounding may have left without one.
@@ -572,7 +572,7 @@ mod tests {
             products: signatures.tr_mul(signatures),
             with_residual: signatures.tr_mul(residual),
             residual: residual.norm_squared(),
-            freedom: ROWS as f64,
+            degrees_of_freedom: ROWS as f64,
             absorbed: DMatrix::zeros(0, 0),
         }
     }
@@ -580,7 +580,7 @@ mod tests {
     /// Cases row by row, with the evidence of the search itself.
     #[test]
     fn the_least_magnitude_is_named_in_four_cases_of_five() {
-        let prior = NoisePrior { freedom: 10.0, level: 1.0 };
+        let prior = NoisePrior { degrees_of_freedom: 10.0, level: 1.0 };
         let noise: f64 = 1.7;
         for (likeness, found) in [(0.2, vec![]), (0.9, vec![]), (0.6, vec![(5, 1)])] {
             let (candidates, signatures) = problem(likeness);
@@ -636,14 +636,14 @@ mod tests {
         let copy = signatures.column(0) * 1.0;
         signatures.set_column(1, &copy);
         let unit = surviving(&signatures, &DVector::zeros(ROWS));
-        let bench = Bench::new(&candidates, &unit, NoisePrior { freedom: 10.0, level: 1.0 }, 1.0, &[]);
+        let bench = Bench::new(&candidates, &unit, NoisePrior { degrees_of_freedom: 10.0, level: 1.0 }, 1.0, &[]);
         // Of two that are the same the one that is less likely beforehand is never named.
         let power = bench.power(&[1]);
         assert_eq!(power.least, None);
         assert!(power.alike.is_some_and(|(other, likeness)| other == 0 && likeness > 0.999));
         signatures.fill_column(8, 0.0);
         let unit = surviving(&signatures, &DVector::zeros(ROWS));
-        let bench = Bench::new(&candidates, &unit, NoisePrior { freedom: 10.0, level: 1.0 }, 1.0, &[]);
+        let bench = Bench::new(&candidates, &unit, NoisePrior { degrees_of_freedom: 10.0, level: 1.0 }, 1.0, &[]);
         assert_eq!(bench.power(&[6]), Power { least: None, alike: None });
     }
 

@@ -9,14 +9,14 @@ use super::mistake;
 use super::scatter::{self, Scatter};
 use super::whitening::Whitening;
 use crate::arm::Arm;
+use crate::arm::frames::{Pose, registration, rotation_from_vector, rotation_vector};
 use crate::effects::signature::posture::{Mechanism, Posture};
 use crate::effects::signature::shape::Displacement;
-use crate::frames::{Pose, registration, rotation_from_vector, rotation_vector};
 use crate::measurement::{Measurement, Sensor};
 
 /// One sigma of a joint frame's position, m: machining and assembly are better than this.
 const FRAME_SHIFT: f64 = 5e-3;
-/// One sigma of a joint frame's attitude, rad.
+/// One sigma of a joint frame's orientation, rad.
 const FRAME_TURN: f64 = 10e-3;
 /// Base and target are free: so wide, about where the fit finds them, that it never binds.
 const FREE_SHIFT: f64 = 50e-3;
@@ -91,7 +91,7 @@ pub struct Rows {
     pub postures: Vec<Posture>,
     /// Target in root of each row, m.
     pub targets: Vec<Vector3<f64>>,
-    /// Equations per row: 3, with attitudes 6.
+    /// Equations per row: 3, with orientations 6.
     pub per_row: usize,
     /// Residuals, m and rad.
     pub residual: DVector<f64>,
@@ -111,9 +111,9 @@ pub struct Rows {
     pub notes: Vec<String>,
 }
 
-/// Sigmas of the position (m) and the attitude (rad) of a reading.
+/// Sigmas of the position (m) and the orientation (rad) of a reading.
 fn sigmas(sensor: &Sensor, position: &Vector3<f64>) -> (f64, f64) {
-    (sensor.position_sigma_at(position).max(1e-9), sensor.attitude_sigma_rad.unwrap_or(1.0).max(1e-9))
+    (sensor.position_sigma_at(position).max(1e-9), sensor.orientation_sigma_rad.unwrap_or(1.0).max(1e-9))
 }
 
 /// Improvement over the noise's mean square, by parameter, from which on sessions have bases of their own (an F value).
@@ -195,8 +195,8 @@ fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], bases: usize) 
     if different.len() < 6 {
         return Err(DiagnosisError::TooFew { found: measurements.len(), different: different.len(), needed: 6 });
     }
-    let attitude = sensor.attitude_sigma_rad.is_some() && measurements.iter().all(|row| row.attitude_xyzw.is_some());
-    let per_row = if attitude { 6 } else { 3 };
+    let orientation = sensor.orientation_sigma_rad.is_some() && measurements.iter().all(|row| row.orientation_xyzw.is_some());
+    let per_row = if orientation { 6 } else { 3 };
     let name = |row: &Measurement| row.target.clone().unwrap_or_default();
     let mut targets_named: Vec<String> = measurements.iter().map(|row| name(row)).collect();
     targets_named.sort();
@@ -205,7 +205,7 @@ fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], bases: usize) 
         measurements.iter().map(|row| targets_named.iter().position(|known| *known == name(row)).unwrap_or(0)).collect();
     let mut offsets = vec![Vector3::zeros(); targets_named.len()];
     let mut turns = vec![UnitQuaternion::identity(); targets_named.len()];
-    let per_target = if attitude { 6 } else { 3 };
+    let per_target = if orientation { 6 } else { 3 };
 
     let from: Vec<Vector3<f64>> = measurements.iter().map(|row| mechanism.posture(&row.joints, 0.0).tool).collect();
     let to: Vec<Vector3<f64>> = measurements.iter().map(|row| row.position().coords).collect();
@@ -219,13 +219,13 @@ fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], bases: usize) 
             if bases == 1 || from.len() < 4 { of_all } else { registration(&from, &to).unwrap_or(of_all) }
         })
         .collect();
-    if attitude {
-        // The first reading of each target tells its attitude well enough to start from.
+    if orientation {
+        // The first reading of each target tells its orientation well enough to start from.
         for (target, turn) in turns.iter_mut().enumerate() {
             if let Some(row) = which.iter().position(|known| *known == target) {
                 let posture = mechanism.posture(&measurements[row].joints, 0.0);
                 let tool = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(posture.tool_axes));
-                let measured = measurements[row].attitude().unwrap_or_default();
+                let measured = measurements[row].orientation().unwrap_or_default();
                 *turn = (measurement_from_root[session[row]].rotation * tool).inverse() * measured;
             }
         }
@@ -272,7 +272,7 @@ fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], bases: usize) 
             for equation in 0..per_row {
                 inverse_sigmas[first + equation] = 1.0 / if equation < 3 { position } else { turn };
             }
-            if let (true, Some(measured)) = (attitude, measurement.attitude()) {
+            if let (true, Some(measured)) = (orientation, measurement.orientation()) {
                 let tool = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(posture.tool_axes));
                 let predicted = rotation_from_vector(&Vector3::new(rx, ry, rz)) * tool * turns[which[row]];
                 let difference = rotation_vector(&(root_from_measurement.rotation * measured * predicted.inverse()));
@@ -281,7 +281,7 @@ fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], bases: usize) 
             let mut put = |column: usize, shift: Vector3<f64>, turn: Vector3<f64>| {
                 for axis in 0..3 {
                     jacobian[(first + axis, column)] = shift[axis] * prior[column];
-                    if attitude {
+                    if orientation {
                         jacobian[(first + 3 + axis, column)] = turn[axis] * prior[column];
                     }
                 }
@@ -305,7 +305,7 @@ fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], bases: usize) 
             for axis in 0..3 {
                 let direction: Vector3<f64> = posture.tool_axes.column(axis).into();
                 put(column + axis, direction, Vector3::zeros());
-                if attitude {
+                if orientation {
                     put(column + 3 + axis, Vector3::zeros(), direction);
                 }
             }
@@ -391,7 +391,7 @@ fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], bases: usize) 
         for target in 0..targets_named.len() {
             let column = target_at(target);
             offsets[target] += part(column).0;
-            if attitude {
+            if orientation {
                 let turn = Vector3::from_fn(|axis, _| change[column + 3 + axis] * prior[column + 3 + axis]);
                 turns[target] = rotation_from_vector(&turn) * turns[target];
             }

@@ -104,13 +104,13 @@ pub(super) fn look(
     let mut best: (f64, Vec<Scatter>) = (0.0, Vec::new());
     for (residual, lost) in trials {
         let all = Left::new(rows, problem, &residual, rows.per_row);
-        // Attitudes may be less exact than they are said to be, which is no joint's doing.
+        // Orientations may be less exact than they are said to be, which is no joint's doing.
         let position = Left::new(rows, problem, &residual, 3);
         let mut scatter: Vec<Scatter> = Vec::new();
         let mut total = -lost;
         while scatter.len() < MOST {
             let tried = (0..rows.mechanism.joint_count()).filter(|joint| !scatter.iter().any(|one| one.joint == *joint));
-            let values = tried.map(|joint| all.value(surviving.freedom, noise, &scatter, joint));
+            let values = tried.map(|joint| all.value(surviving.degrees_of_freedom, noise, &scatter, joint));
             match values.max_by(|a, b| a.0.total_cmp(&b.0)) {
                 Some((gain, one))
                     if gain + odds > position.lopsided(&scatter).max(0.0) && position.along(&scatter, one.joint) > ALONG =>
@@ -173,11 +173,11 @@ impl<'a> Left<'a> {
     /// Logarithm of the marginal likelihood of the residual with a scatter of `joint` besides `others` over that without, the noise's
     /// level integrated out, the geometry as fitted, and the sigma averaged over; and the best sigma. `freedom`: equations that the
     /// model leaves. A row counts by its weight.
-    fn value(&self, freedom: f64, noise: NoisePrior, others: &[Scatter], joint: usize) -> (f64, Scatter) {
+    fn value(&self, degrees_of_freedom: f64, noise: NoisePrior, others: &[Scatter], joint: usize) -> (f64, Scatter) {
         let rows = self.in_sigmas(others, joint);
         let square: f64 = rows.iter().map(|(weight, left, _)| weight * left.norm_squared()).sum();
-        let degrees = noise.freedom + freedom * self.per_row as f64 / self.rows.per_row as f64;
-        let known = noise.freedom * noise.level;
+        let degrees = noise.degrees_of_freedom + degrees_of_freedom * self.per_row as f64 / self.rows.per_row as f64;
+        let known = noise.degrees_of_freedom * noise.level;
         let values: Vec<(f64, f64)> = (0..STEPS)
             .map(|step| {
                 let sigma = SMALLEST * libm::pow(2.0, 0.5 * f64::from(step));

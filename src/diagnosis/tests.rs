@@ -16,7 +16,7 @@ use crate::scene;
 use crate::seed::{Stream, stream};
 
 const SIGMA: f64 = 20e-6;
-const ATTITUDE_SIGMA: f64 = 2e-5;
+const ORIENTATION_SIGMA: f64 = 2e-5;
 
 fn arm() -> Arm {
     scene::read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml")).unwrap().scene.arm
@@ -27,7 +27,7 @@ fn sensor() -> Sensor {
         position_in_base: nalgebra::Point3::origin(),
         position_sigma_m: SIGMA,
         position_sigma_per_m: 0.0,
-        attitude_sigma_rad: None,
+        orientation_sigma_rad: None,
         temperature_sigma_k: None,
         view: None,
     }
@@ -75,16 +75,16 @@ fn readings(label: &str, off: impl Fn(&Arm, &[f64], &[i8], usize, f64) -> f64) -
             let noise = Vector3::from_fn(|_, _| SIGMA * stream.normal());
             let pose = at.forward(&true_joints);
             let position = pose.translation.vector + noise;
-            // Read only where the sensor has attitudes.
-            let turn = Vector3::from_fn(|_, _| ATTITUDE_SIGMA * turns.normal());
-            let attitude = pose.rotation * UnitQuaternion::from_scaled_axis(turn);
+            // Read only where the sensor has orientations.
+            let turn = Vector3::from_fn(|_, _| ORIENTATION_SIGMA * turns.normal());
+            let orientation = pose.rotation * UnitQuaternion::from_scaled_axis(turn);
             Measurement {
                 index,
                 pose_id: index,
                 time_s: 60.0 * index as f64,
                 joints,
                 position_m: position.into(),
-                attitude_xyzw: Some(attitude.coords.into()),
+                orientation_xyzw: Some(orientation.coords.into()),
                 approach,
                 payload_kg: Some(payload_kg),
                 ..Measurement::default()
@@ -175,16 +175,16 @@ fn a_joint_that_does_not_repeat_is_no_ripple() {
 }
 
 #[test]
-fn attitudes_that_are_better_than_said_are_no_effect() {
+fn orientations_that_are_better_than_said_are_no_effect() {
     let (arm, rows) = readings("test/attitudes", |_, _, _, _, _| 0.0);
-    let sensor = Sensor { attitude_sigma_rad: Some(4.5 * ATTITUDE_SIGMA), ..sensor() };
+    let sensor = Sensor { orientation_sigma_rad: Some(4.5 * ORIENTATION_SIGMA), ..sensor() };
     let rows: Vec<&Measurement> = rows.iter().collect();
     let options = Options { noise: NoiseSource::Declared, without: Vec::new(), only: None };
     let found = diagnose(&arm, &sensor, &rows, &options).unwrap();
     assert!(found.effects.is_empty() && !found.unknown.present, "{}", found.sentence);
     let sigma = found.noise_floor.rotation_rad.unwrap();
-    assert!((sigma / ATTITUDE_SIGMA - 1.0).abs() < 0.25, "{sigma}");
-    assert!(found.notes.iter().any(|note| note.contains("attitudes are taken to be read")), "{:?}", found.notes);
+    assert!((sigma / ORIENTATION_SIGMA - 1.0).abs() < 0.25, "{sigma}");
+    assert!(found.notes.iter().any(|note| note.contains("orientations are taken to be read")), "{:?}", found.notes);
 }
 
 #[test]

@@ -56,7 +56,8 @@ fn noise_floor(analysis: &Analysis<'_>) -> NoiseFloor {
     };
     // In the same proportion to that of the positions as what is left of them.
     let proportion = position_m / analysis.sigma_m();
-    let rotation_rad = analysis.sensor.attitude_sigma_rad.filter(|_| analysis.rows.per_row == 6).map(|sigma| sigma * proportion);
+    let rotation_rad =
+        analysis.sensor.orientation_sigma_rad.filter(|_| analysis.rows.per_row == 6).map(|sigma| sigma * proportion);
     NoiseFloor { position_m, rotation_rad, source }
 }
 

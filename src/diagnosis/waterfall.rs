@@ -80,7 +80,7 @@ impl<'a> Waterfall<'a> {
     #[must_use]
     pub fn displacements(&self, effect: &Effect) -> Option<Vec<Displacement>> {
         let (shape, values) = formula(effect, self.rows.mechanism.joint_count())?;
-        let attitude = self.rows.per_row == 6;
+        let orientation = self.rows.per_row == 6;
         let known = |joint: usize, values: &[f64]| joint < values.len();
         self.conditions
             .readings
@@ -91,7 +91,7 @@ impl<'a> Waterfall<'a> {
                     Shape::Warmth(_) | Shape::Growth(_) if reading.rise_k.is_empty() => return None,
                     _ => {}
                 }
-                let columns = shape.columns(reading, attitude);
+                let columns = shape.columns(reading, orientation);
                 Some(std::array::from_fn(|axis| columns.iter().zip(&values).map(|(column, value)| column[axis] * value).sum()))
             })
             .collect()

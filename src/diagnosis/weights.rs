@@ -32,27 +32,27 @@ pub(super) fn weigh(rows: &Rows, residual: &DVector<f64>, before: &[f64], groups
     Weighed { squares, far, dependent, correlation }
 }
 
-/// Degrees of freedom of repeats from which on they tell the attitudes' noise.
+/// Degrees of freedom of repeats from which on they tell the orientations' noise.
 const ENOUGH: f64 = 36.0;
 /// Mean square, over what is said of the noise, beyond which what is left is no noise.
 const NO_NOISE: f64 = 9.0;
 /// Beyond chance, a difference of the logarithms of the sigmas that matters.
 const MATTERS: f64 = 0.1;
 
-/// The noise of attitudes beside that of positions, over what is said of both; one where the difference is chance or next to nothing. None
+/// The noise of orientations beside that of positions, over what is said of both; one where the difference is chance or next to nothing. None
 /// where there are not enough repeats.
-pub(super) fn attitude_of_repeats(sensor: &Sensor, repeats: Option<Repeats>, position_m: f64) -> Option<f64> {
-    let repeats = repeats.filter(|repeats| repeats.freedom >= ENOUGH)?;
-    let (found, said) = (repeats.attitude_rad? / repeats.position_m, sensor.attitude_sigma_rad? / position_m);
+pub(super) fn orientation_of_repeats(sensor: &Sensor, repeats: Option<Repeats>, position_m: f64) -> Option<f64> {
+    let repeats = repeats.filter(|repeats| repeats.degrees_of_freedom >= ENOUGH)?;
+    let (found, said) = (repeats.orientation_rad? / repeats.position_m, sensor.orientation_sigma_rad? / position_m);
     let log = libm::log(found / said);
-    let differs = log.abs() > MATTERS + 3.0 * libm::sqrt(1.0 / repeats.freedom);
+    let differs = log.abs() > MATTERS + 3.0 * libm::sqrt(1.0 / repeats.degrees_of_freedom);
     (found > 0.0 && said > 0.0).then(|| if differs { libm::exp(log) } else { 1.0 })
 }
 
-/// How much larger than that of the positions what is left of the attitudes is, both in the sensor's sigmas, where that is neither chance
+/// How much larger than that of the positions what is left of the orientations is, both in the sensor's sigmas, where that is neither chance
 /// nor next to nothing: one of them is not what it is said to be (estimation of variance components, Helmert 1907, here by medians). None
 /// where so much is left that it is not noise. `known`: that it is not as said is known already, and by how much is asked.
-pub(super) fn attitude_over_position(rows: &Rows, residual: &DVector<f64>, known: bool) -> Option<f64> {
+pub(super) fn orientation_over_position(rows: &Rows, residual: &DVector<f64>, known: bool) -> Option<f64> {
     if rows.per_row != 6 {
         return None;
     }
@@ -64,11 +64,11 @@ pub(super) fn attitude_over_position(rows: &Rows, residual: &DVector<f64>, known
         squares.sort_by(f64::total_cmp);
         squares.get(squares.len() / 2).map_or(0.0, |middle| middle / outliers::MEDIAN[0])
     };
-    let (position, attitude) = (level(0), level(3));
-    if position <= 0.0 || attitude <= 0.0 || position.min(attitude) > NO_NOISE {
+    let (position, orientation) = (level(0), level(3));
+    if position <= 0.0 || orientation <= 0.0 || position.min(orientation) > NO_NOISE {
         return None;
     }
-    let log = 0.5 * libm::log(attitude / position);
+    let log = 0.5 * libm::log(orientation / position);
     // A median of squares of three equations tells sigma as well as three fifths of the readings would; rows that count less, less.
     let readings: f64 = counts.iter().map(|row| rows.whitening.weights()[*row]).sum();
     let deviation = if known { 0.0 } else { libm::sqrt(2.0 / (6.0 * 0.6 * readings)) };

@@ -81,7 +81,11 @@ fn trials() -> Figure {
         }
         panel
     };
-    Figure::new("", 2).with(panel("Position", "position error (mm)", 0.32)).with(panel("Attitude", "attitude error (°)", 0.0021))
+    Figure::new("", 2).with(panel("Position", "position error (mm)", 0.32)).with(panel(
+        "Orientation",
+        "orientation error (°)",
+        0.0021,
+    ))
 }
 
 fn random_sets() -> Figure {
@@ -112,7 +116,7 @@ fn methods() -> Figure {
     let names = ["PSO, comprehensive index", "PSO, O1 only", "DETMAX", "random"];
     Figure::new("Method by criterion", 1).with(
         Panel::new(
-            Axis::categories("criterion", ["O_C", "O₂", "O3", "position error (mm)", "attitude error (°)"]),
+            Axis::categories("criterion", ["O_C", "O₂", "O3", "position error (mm)", "orientation error (°)"]),
             Axis::categories("", names),
         )
         .with(Series::new("", Kind::Cells { values, digits: 3, shade: Shade::Columns })),

@@ -4,7 +4,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::least_squares::fit_some;
 use crate::arm::Arm;
-use crate::frames::registration;
+use crate::arm::frames::registration;
 use crate::measurement::{Measurement, Sensor};
 
 /// The measurement frame and the target could not be found.
@@ -29,7 +29,7 @@ pub enum AlignmentError {
     NotConverged,
 }
 
-/// `arm` with its chain in the measurement frame ([`crate::kinematics::Chain::in_measurement_frame`]): the six parameters of the
+/// `arm` with its chain in the measurement frame ([`crate::arm::Chain::in_measurement_frame`]): the six parameters of the
 /// base and those of the target that can be seen have nominal values fitted to `measurements`, everything else stays nominal. This
 /// is the "nominal model" of a real arm, whose frames no data sheet tells.
 ///
@@ -48,7 +48,7 @@ pub fn align(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement]) -> Resul
 
     let mut aligned = arm.clone();
     aligned.chain = arm.chain.in_measurement_frame();
-    // Nobody knows where the cell is in the measurement frame.
+    // Silent knows where the cell is in the measurement frame.
     aligned.fixtures.clear();
     let parameters = &mut aligned.chain.parameters;
     let count = parameters.len();
@@ -60,9 +60,9 @@ pub fn align(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement]) -> Resul
         }
     };
     set(0, translation, rotation);
-    // Where attitudes are measured, the first tells the target's well enough to start from.
-    if let (Some(attitude), Some(pose)) = (measurements[0].attitude(), poses.first()) {
-        set(count - 6, Vector3::zeros(), (rotation * pose.rotation).inverse() * attitude);
+    // Where orientations are measured, the first tells the target's well enough to start from.
+    if let (Some(orientation), Some(pose)) = (measurements[0].orientation(), poses.first()) {
+        set(count - 6, Vector3::zeros(), (rotation * pose.rotation).inverse() * orientation);
     }
     let free: Vec<usize> = (0..6).chain(count - 6..count).collect();
     let values = fit_some(&aligned, sensor, measurements, &free).ok_or(AlignmentError::NotConverged)?;

@@ -5,11 +5,11 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 use super::outcome::{Combination, DeclaredNoise, Errors, Identification, ParameterEstimate, Residual, Summary};
 use crate::arm::Arm;
-use crate::frames::{Pose, pose_error};
-use crate::kinematics::ChainAt;
+use crate::arm::ChainAt;
+use crate::arm::frames::{Pose, pose_error};
+use crate::measurement::Weights;
 use crate::measurement::{Measurement, Sensor};
 use crate::quality::subspace::{Subspace, late};
-use crate::scene::Weights;
 
 /// Steps after which a fit that has not settled is given up.
 const MAX_STEPS: usize = 200;
@@ -70,7 +70,7 @@ pub enum IdentificationError {
          weights = \"unit\""
     )]
     NoNoise {
-        /// `position` or `attitude`.
+        /// `position` or `orientation`.
         what: &'static str,
     },
 }
@@ -91,14 +91,14 @@ pub fn identify(
     weights: Weights,
     measurements: &[Measurement],
 ) -> Result<Identification, IdentificationError> {
-    let structure = Subspace::of_structure(arm, sensor.attitude_sigma_rad.is_some() && measures_attitude(measurements));
+    let structure = Subspace::of_structure(arm, sensor.orientation_sigma_rad.is_some() && measures_orientation(measurements));
     identify_on(&structure, arm, sensor, weights, measurements)
 }
 
-/// Whether every measurement to fit has an attitude: else positions are fitted only.
-fn measures_attitude(measurements: &[Measurement]) -> bool {
+/// Whether every measurement to fit has an orientation: else positions are fitted only.
+fn measures_orientation(measurements: &[Measurement]) -> bool {
     let mut fitted = measurements.iter().filter(|measurement| measurement.role == crate::measurement::Role::Fit);
-    fitted.all(|measurement| measurement.attitude_xyzw.is_some())
+    fitted.all(|measurement| measurement.orientation_xyzw.is_some())
 }
 
 /// [`identify`] for many sets of measurements of one arm, whose structure (for what is measured of a pose) is told once.
@@ -142,8 +142,8 @@ pub fn identify_on(
         let subspace = Subspace::reveal(&problem.in_sigmas(&start.jacobian), &late(arm), 1.0 / PLAUSIBLE_ERROR, limit);
         let solution = solve(&problem, &subspace.independent, nominal.clone(), start);
         let noise = problem.noise_scale(&solution.values);
-        let freedom = equations - subspace.rank();
-        let scale = if freedom > 0 { (noise.sum_of_squares / freedom as f64).sqrt() } else { 1.0 };
+        let degrees_of_freedom = equations - subspace.rank();
+        let scale = if degrees_of_freedom > 0 { (noise.sum_of_squares / degrees_of_freedom as f64).sqrt() } else { 1.0 };
         let covariance = problem.covariance(&solution.jacobian, &subspace);
         let grown = if noise.known && scale.is_finite() { scale.clamp(1.0, LARGEST_NOISE_FACTOR) } else { 1.0 };
         let hopeless = |variance: &f64| variance.is_nan() || grown * variance.sqrt() > PLAUSIBLE_ERROR;
@@ -169,13 +169,13 @@ pub fn identify_on(
             if names.is_empty() { "more".to_owned() } else { names.join(", ") }
         ));
     }
-    let freedom = equations - rank;
-    let p_value = match (freedom, ChiSquared::new(freedom as f64)) {
+    let degrees_of_freedom = equations - rank;
+    let p_value = match (degrees_of_freedom, ChiSquared::new(degrees_of_freedom as f64)) {
         (1.., Ok(distribution)) => distribution.sf(noise.sum_of_squares),
         _ => 1.0,
     };
     // Only residuals weighted by their noise have this distribution.
-    let tested = noise.known && freedom > 0 && weights == Weights::Noise;
+    let tested = noise.known && degrees_of_freedom > 0 && weights == Weights::Noise;
     let inflated = tested && p_value < DECLARED_NOISE_REJECTED;
     if inflated {
         notes.push(format!(
@@ -190,10 +190,10 @@ pub fn identify_on(
              readings in the robot's order?"
         ));
     }
-    if freedom == 0 {
+    if degrees_of_freedom == 0 {
         notes.push("as many equations as parameters: nothing is left to tell how good the fit is".to_owned());
     }
-    let quantile = match StudentsT::new(0.0, 1.0, freedom.max(1) as f64) {
+    let quantile = match StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1) as f64) {
         Ok(distribution) if inflated => distribution.inverse_cdf(0.975),
         _ => 1.959_963_984_540_054,
     };
@@ -282,7 +282,7 @@ pub fn identify_on(
         iterations: solution.steps,
         rank,
         equations,
-        residual_scale: (noise.known && freedom > 0).then_some(scale),
+        residual_scale: (noise.known && degrees_of_freedom > 0).then_some(scale),
         parameters,
         combinations,
         nominal: errors(&fit, &at_nominal),
@@ -345,11 +345,11 @@ fn doubts(arm: &Arm, values: &[f64], fit: &[&Measurement], identified: &ChainAt,
 #[must_use]
 pub fn errors(measurements: &[&Measurement], chain: &ChainAt) -> Errors {
     let residuals: Vec<Vector6<f64>> = measurements.iter().map(|measurement| residual(measurement, chain)).collect();
-    let attitude = measurements.iter().all(|measurement| measurement.attitude_xyzw.is_some());
+    let orientation = measurements.iter().all(|measurement| measurement.orientation_xyzw.is_some());
     Errors {
         count: measurements.len(),
         position_m: summary(residuals.iter().map(|residual| residual.fixed_rows::<3>(0).norm())),
-        rotation_rad: attitude.then(|| summary(residuals.iter().map(|residual| residual.fixed_rows::<3>(3).norm()))),
+        rotation_rad: orientation.then(|| summary(residuals.iter().map(|residual| residual.fixed_rows::<3>(3).norm()))),
     }
 }
 
@@ -370,11 +370,11 @@ pub fn summary(values: impl Iterator<Item = f64>) -> Summary {
     Summary { min, mean: sum / count as f64, rms: (squares / count as f64).sqrt(), max }
 }
 
-/// Measured minus predicted pose; the rotation part is zero where no attitude was measured.
+/// Measured minus predicted pose; the rotation part is zero where no orientation was measured.
 fn residual(measurement: &Measurement, chain: &ChainAt) -> Vector6<f64> {
     let predicted = chain.forward(&measurement.joints);
-    match measurement.attitude() {
-        Some(attitude) => pose_error(&Pose::from_parts(measurement.position().into(), attitude), &predicted),
+    match measurement.orientation() {
+        Some(orientation) => pose_error(&Pose::from_parts(measurement.position().into(), orientation), &predicted),
         None => {
             let difference = measurement.position().coords - predicted.translation.vector;
             Vector6::new(difference.x, difference.y, difference.z, 0.0, 0.0, 0.0)
@@ -386,7 +386,7 @@ struct Problem<'a> {
     arm: &'a Arm,
     measurements: &'a [&'a Measurement],
     rows_per_pose: usize,
-    /// Weight and declared sigma of the position and the attitude rows of each measurement.
+    /// Weight and declared sigma of the position and the orientation rows of each measurement.
     rows: Vec<RowWeights>,
 }
 
@@ -406,7 +406,7 @@ struct Linearised {
 struct NoiseScale {
     sum_of_squares: f64,
     known: bool,
-    /// RMS length of the declared noise of a position (m) and, where it is measured, of an attitude (rad).
+    /// RMS length of the declared noise of a position (m) and, where it is measured, of an orientation (rad).
     position_m: f64,
     rotation_rad: Option<f64>,
 }
@@ -419,19 +419,19 @@ impl<'a> Problem<'a> {
         measurements: &'a [&'a Measurement],
     ) -> Result<Self, IdentificationError> {
         // Mixed data are fitted as what all of them have.
-        let attitude =
-            sensor.attitude_sigma_rad.is_some() && measurements.iter().all(|measurement| measurement.attitude_xyzw.is_some());
+        let orientation = sensor.orientation_sigma_rad.is_some()
+            && measurements.iter().all(|measurement| measurement.orientation_xyzw.is_some());
         let rows = measurements
             .iter()
             .map(|measurement| {
                 let sigma = [
                     sensor.position_sigma_at(&measurement.position().coords),
-                    if attitude { sensor.attitude_sigma_rad.unwrap_or(0.0) } else { 1.0 },
+                    if orientation { sensor.orientation_sigma_rad.unwrap_or(0.0) } else { 1.0 },
                 ];
                 let weight = match weights {
                     Weights::Unit => [1.0, 1.0],
                     Weights::Noise => {
-                        for (sigma, what) in sigma.iter().zip(["position", "attitude"]) {
+                        for (sigma, what) in sigma.iter().zip(["position", "orientation"]) {
                             if *sigma <= 0.0 {
                                 return Err(IdentificationError::NoNoise { what });
                             }
@@ -442,7 +442,7 @@ impl<'a> Problem<'a> {
                 Ok(RowWeights { weight, sigma })
             })
             .collect::<Result<_, _>>()?;
-        Ok(Problem { arm, measurements, rows_per_pose: if attitude { 6 } else { 3 }, rows })
+        Ok(Problem { arm, measurements, rows_per_pose: if orientation { 6 } else { 3 }, rows })
     }
 
     fn equations(&self) -> usize {
@@ -458,9 +458,9 @@ impl<'a> Problem<'a> {
         let mut rows = vec![0.0; 6 * n];
         for (index, (measurement, row)) in self.measurements.iter().zip(&self.rows).enumerate() {
             let (axes, origin) = chain.jacobian_into(&measurement.joints, &mut rows, n);
-            let predicted = crate::frames::pose_from_parts(&axes, &origin);
-            let error = match measurement.attitude() {
-                Some(attitude) => pose_error(&Pose::from_parts(measurement.position().into(), attitude), &predicted),
+            let predicted = crate::arm::frames::pose_from_parts(&axes, &origin);
+            let error = match measurement.orientation() {
+                Some(orientation) => pose_error(&Pose::from_parts(measurement.position().into(), orientation), &predicted),
                 None => {
                     let difference = measurement.position().coords - origin;
                     Vector6::new(difference.x, difference.y, difference.z, 0.0, 0.0, 0.0)
@@ -565,7 +565,7 @@ fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |row, column| inverse[(row, column)] * scale[row] * scale[column]))
 }
 
-/// Turns the rotation rows of a Jacobian (change of the predicted attitude) into the change of the rotation residual `error`:
+/// Turns the rotation rows of a Jacobian (change of the predicted orientation) into the change of the rotation residual `error`:
 /// the inverse right Jacobian of the rotation group, exact however large the residual is.
 fn turn_to_residual(rows: &mut [f64], n: usize, error: &Vector3<f64>) {
     let angle = error.norm();

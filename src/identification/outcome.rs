@@ -84,7 +84,7 @@ pub struct Combination {
 pub struct DeclaredNoise {
     /// Of a position (three axes), m.
     pub position_m: f64,
-    /// Of an attitude (three axes), rad; absent where no attitude was measured.
+    /// Of an orientation (three axes), rad; absent where no orientation was measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation_rad: Option<f64>,
 }
@@ -96,7 +96,7 @@ pub struct Errors {
     pub count: usize,
     /// Distance between measured and predicted origin, m.
     pub position_m: Summary,
-    /// Angle between measured and predicted attitude, rad; absent where no attitude was measured.
+    /// Angle between measured and predicted orientation, rad; absent where no orientation was measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation_rad: Option<Summary>,
 }

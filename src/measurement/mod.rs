@@ -36,9 +36,10 @@ pub struct Measurement {
     pub temperatures_c: Vec<f64>,
     /// Measured origin of the tool frame, m.
     pub position_m: [f64; 3],
-    /// Measured attitude of the tool frame as quaternion x, y, z, w; absent where the sensor sees positions only.
+    /// Measured orientation of the tool frame as quaternion x, y, z, w; absent where the sensor sees positions only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub attitude_xyzw: Option<[f64; 4]>,
+    #[serde(rename = "attitude_xyzw")]
+    pub orientation_xyzw: Option<[f64; 4]>,
     /// Direction of each joint's last move before the reading: -1, 0 (it did not move) or 1; empty where not recorded.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub approach: Vec<i8>,
@@ -66,11 +67,11 @@ impl Measurement {
         Point3::from(self.position_m)
     }
 
-    /// The measured attitude, where there is one.
+    /// The measured orientation, where there is one.
     #[must_use]
-    pub fn attitude(&self) -> Option<UnitQuaternion<f64>> {
+    pub fn orientation(&self) -> Option<UnitQuaternion<f64>> {
         // The recorded numbers are taken as they are, so that a replay sees the bits that were measured.
-        self.attitude_xyzw.map(|[x, y, z, w]| UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z)))
+        self.orientation_xyzw.map(|[x, y, z, w]| UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z)))
     }
 }
 
@@ -83,8 +84,8 @@ pub struct Sensor {
     pub position_sigma_m: f64,
     /// Growth of the position noise with distance, m per m.
     pub position_sigma_per_m: f64,
-    /// Attitude noise per axis, rad; `None` where the sensor sees positions only, zero where it is taken as exact.
-    pub attitude_sigma_rad: Option<f64>,
+    /// Orientation noise per axis, rad; `None` where the sensor sees positions only, zero where it is taken as exact.
+    pub orientation_sigma_rad: Option<f64>,
     /// Noise of the temperature sensors on the moving links, K; `None` where there are none.
     pub temperature_sigma_k: Option<f64>,
     /// The cone that it sees; `None` where it sees everything.
@@ -129,4 +130,13 @@ impl Sensor {
         // Exact at 0 and π, where an arc cosine would hang on rounding.
         libm::atan2(axis.cross(&sight).norm(), axis.dot(&sight)) <= view.half_angle_rad
     }
+}
+
+/// Weights of the least-squares fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Weights {
+    /// Each residual over its declared sigma.
+    Noise,
+    /// Metres and radians alike, as in eq. 6.
+    Unit,
 }

@@ -107,7 +107,7 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
             joints: vec![0.0; layout.joints],
             temperatures_c: vec![0.0; layout.sensors],
             position_m: [0.0; 3],
-            attitude_xyzw: layout.attitude.then_some([0.0; 4]),
+            orientation_xyzw: layout.orientation.then_some([0.0; 4]),
             approach: vec![0; layout.approaches],
             ..Measurement::default()
         };
@@ -130,7 +130,7 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
                 Column::Position { axis, factor } => row.position_m[*axis] = number()? * factor,
                 Column::Quaternion { component } => {
                     let value = number()?;
-                    if let Some(quaternion) = &mut row.attitude_xyzw {
+                    if let Some(quaternion) = &mut row.orientation_xyzw {
                         quaternion[*component] = value;
                     }
                 }
@@ -171,7 +171,7 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
                 Column::Target => row.target = Some(text.to_owned()),
             }
         }
-        if let Some(quaternion) = &mut row.attitude_xyzw {
+        if let Some(quaternion) = &mut row.orientation_xyzw {
             let norm = quaternion.iter().map(|component| component * component).sum::<f64>().sqrt();
             if (norm - 1.0).abs() > 1e-3 {
                 return Err(wrong(line, format!("the quaternion (qx, qy, qz, qw) has length {norm:.6}; it must be 1")));
@@ -217,7 +217,7 @@ pub fn write(measurements: &[Measurement]) -> Result<String, csv::Error> {
     let every = |has: fn(&Measurement) -> bool| measurements.iter().all(has);
     let joints = measurements.first().map_or(0, |row| row.joints.len());
     let sensors = measurements.iter().map(|row| row.temperatures_c.len()).min().unwrap_or(0);
-    let attitude = every(|row| row.attitude_xyzw.is_some());
+    let orientation = every(|row| row.orientation_xyzw.is_some());
     let approach = every(|row| !row.joints.is_empty() && row.approach.len() == row.joints.len());
     let optional = [
         ("temp_ambient_c", every(|row| row.ambient_c.is_some())),
@@ -231,7 +231,7 @@ pub fn write(measurements: &[Measurement]) -> Result<String, csv::Error> {
     let mut header = names(true, &["pose_id", "role", "time_s"]);
     header.extend((1..=joints).map(|joint| format!("q{joint}_rad")));
     header.extend(names(true, &["x_m", "y_m", "z_m"]));
-    header.extend(names(attitude, &["qx", "qy", "qz", "qw"]));
+    header.extend(names(orientation, &["qx", "qy", "qz", "qw"]));
     header.extend((1..=sensors).map(|sensor| format!("temp{sensor}_c")));
     header.extend((1..=joints).filter(|_| approach).map(|joint| format!("approach{joint}")));
     header.extend(optional.iter().filter(|(_, present)| *present).map(|(name, _)| (*name).to_owned()));
@@ -240,7 +240,7 @@ pub fn write(measurements: &[Measurement]) -> Result<String, csv::Error> {
     for row in measurements {
         let role = if row.role == Role::Fit { "fit" } else { "held_out" };
         let mut fields = vec![row.pose_id.to_string(), role.to_owned(), row.time_s.to_string()];
-        let quaternion = row.attitude_xyzw.iter().filter(|_| attitude).flatten();
+        let quaternion = row.orientation_xyzw.iter().filter(|_| orientation).flatten();
         let numbers = row.joints.iter().chain(&row.position_m).chain(quaternion).chain(&row.temperatures_c[..sensors]);
         fields.extend(numbers.map(f64::to_string));
         fields.extend(row.approach.iter().filter(|_| approach).map(i8::to_string));
@@ -258,7 +258,7 @@ struct Layout {
     joints: usize,
     sensors: usize,
     approaches: usize,
-    attitude: bool,
+    orientation: bool,
 }
 
 impl Layout {
@@ -289,10 +289,10 @@ impl Layout {
             Column::Quaternion { component } => Some(*component),
             _ => None,
         });
-        let attitude = match components {
+        let orientation = match components {
             Ok(0) => false,
             Ok(4) => true,
-            _ => return Err("an attitude needs all of qx, qy, qz, qw".to_owned()),
+            _ => return Err("an orientation needs all of qx, qy, qz, qw".to_owned()),
         };
         let sensors = numbered(columns, |column| match column {
             Column::Temperature { sensor } => Some(*sensor),
@@ -310,7 +310,7 @@ impl Layout {
             Ok(count) if count == joints => count,
             _ => return Err(format!("directions of approach need approach1 … approach{joints}: one column per joint, or none")),
         };
-        Ok(Layout { joints, sensors, approaches, attitude })
+        Ok(Layout { joints, sensors, approaches, orientation })
     }
 }
 
@@ -405,7 +405,7 @@ mod tests {
             joints: vec![0.1 + 0.2, -1e-17, 3.0],
             temperatures_c: vec![20.1, 1.0 / 3.0],
             position_m: [1.0 / 3.0, -2.0 / 7.0, 1e-9],
-            attitude_xyzw: Some([0.5, -0.5, 0.5, -0.5]),
+            orientation_xyzw: Some([0.5, -0.5, 0.5, -0.5]),
             approach: vec![-1, 0, 1],
             ambient_c: Some(20.0 + 1.0 / 3.0),
             payload_kg: Some(0.1 + 0.2),
@@ -430,7 +430,7 @@ mod tests {
             ("q1_rad,x_m,y_m\n0,0,0\n", "needs x_m, y_m and z_m"),
             ("q1_rad,q3_rad,x_m,y_m,z_m\n", "q2 is missing or doubled"),
             ("q1_rad,x_m,y_m,z_m,colour\n", "unknown column `colour`; known are pose_id"),
-            ("q1_rad,x_m,y_m,z_m,qx\n", "an attitude needs all of qx, qy, qz, qw"),
+            ("q1_rad,x_m,y_m,z_m,qx\n", "an orientation needs all of qx, qy, qz, qw"),
             ("q1_rad,x_m,y_m,z_m\n0,0,0,0\n0,0,NaN,0\n", "line 3: `y_m` is `NaN`; a finite number is needed"),
             ("q1_rad,x_m,y_m,z_m\n0,0,0\n", "line 2: 3 values, but the header names 4 columns"),
             ("q1_rad,x_m,y_m,z_m,qx,qy,qz,qw\n0,0,0,0,0,0,0,2\n", "line 2: the quaternion (qx, qy, qz, qw) has length 2"),

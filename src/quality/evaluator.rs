@@ -8,8 +8,8 @@ use super::globality::{WorkspaceGrid, dispersion};
 use super::observability::observability;
 use super::subspace::Subspace;
 use crate::arm::Arm;
-use crate::kinematics::ChainAt;
-use crate::scene::{EvennessDomain, JacobianScaling};
+use crate::arm::ChainAt;
+use crate::quality::{EvennessDomain, JacobianScaling};
 
 /// Evaluates sets of configurations of one arm at its nominal parameters.
 pub struct Evaluator {
@@ -17,7 +17,7 @@ pub struct Evaluator {
     subspace: Subspace,
     grid: WorkspaceGrid,
     scaling: JacobianScaling,
-    /// 6 with attitude, 3 for positions only.
+    /// 6 with orientation, 3 for positions only.
     rows_per_pose: usize,
     joint_count: usize,
 }
@@ -33,13 +33,13 @@ pub struct Scratch {
 impl Evaluator {
     /// Prepares the evaluation: the identifiable subspace and the workspace grid.
     #[must_use]
-    pub fn new(arm: &Arm, attitude: bool, domain: EvennessDomain, step_m: f64, scaling: JacobianScaling) -> Self {
+    pub fn new(arm: &Arm, orientation: bool, domain: EvennessDomain, step_m: f64, scaling: JacobianScaling) -> Self {
         Evaluator {
             chain: arm.chain.at_nominal(),
-            subspace: Subspace::of_structure(arm, attitude),
+            subspace: Subspace::of_structure(arm, orientation),
             grid: WorkspaceGrid::new(arm, domain, step_m),
             scaling,
-            rows_per_pose: if attitude { 6 } else { 3 },
+            rows_per_pose: if orientation { 6 } else { 3 },
             joint_count: arm.joint_count(),
         }
     }
@@ -197,13 +197,13 @@ mod tests {
     #[test]
     fn indexes_are_those_of_the_singular_values_of_the_stacked_jacobian() {
         let arm = paper().scene.arm;
-        for attitude in [true, false] {
-            let evaluator = Evaluator::new(&arm, attitude, EvennessDomain::Reachable, 0.1, JacobianScaling::Si);
+        for orientation in [true, false] {
+            let evaluator = Evaluator::new(&arm, orientation, EvennessDomain::Reachable, 0.1, JacobianScaling::Si);
             let rank = evaluator.subspace().rank();
-            assert_eq!(rank, if attitude { 36 } else { 33 });
+            assert_eq!(rank, if orientation { 36 } else { 33 });
             let set = random_set(&arm, 40, "test/evaluator");
             let ours = evaluator.evaluate(&set, &mut Scratch::default());
-            let per_pose = if attitude { 6 } else { 3 };
+            let per_pose = if orientation { 6 } else { 3 };
             let mut stacked = DMatrix::zeros(per_pose * 40, 45);
             let chain = arm.chain.at_nominal();
             for (pose, joints) in set.chunks_exact(8).enumerate() {

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::arm::Arm;
-use crate::scene::EvennessDomain;
+use crate::quality::EvennessDomain;
 use crate::seed::stream;
 
 /// Configurations from which the reachable workspace is told. The cells that are reached grow slowly with this number; it is fixed

@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 
 use super::subspace::Subspace;
 use crate::arm::Arm;
-use crate::kinematics::ChainAt;
+use crate::arm::ChainAt;
 use crate::measurement::Sensor;
-use crate::scene::Weights;
+use crate::measurement::Weights;
 
 /// What a reading tells: the error Jacobian at the nominal parameters, its columns those that can be told apart, its rows divided
 /// by the standard deviation that the fit assumes of them. With these rows X of a set, the parameters' covariance is (XᵀX)⁻¹.
@@ -19,7 +19,7 @@ pub struct InformationModel {
     weights: Weights,
     /// Columns of the full Jacobian.
     independent: Vec<usize>,
-    attitude: bool,
+    orientation: bool,
 }
 
 /// Memory for the Jacobians of one thread.
@@ -32,14 +32,14 @@ impl InformationModel {
     /// The information about `arm` of what `sensor` reads, where residuals are weighted by `weights`.
     #[must_use]
     pub fn new(arm: &Arm, sensor: &Sensor, weights: Weights) -> Self {
-        let attitude = sensor.attitude_sigma_rad.is_some();
-        let subspace = Subspace::of_structure(arm, attitude);
+        let orientation = sensor.orientation_sigma_rad.is_some();
+        let subspace = Subspace::of_structure(arm, orientation);
         InformationModel {
             chain: arm.chain.at_nominal(),
             sensor: sensor.clone(),
             weights,
             independent: subspace.independent,
-            attitude,
+            orientation,
         }
     }
 
@@ -49,19 +49,19 @@ impl InformationModel {
         self.independent.len()
     }
 
-    /// Rows of a block: 6 with attitude, 3 for positions only.
+    /// Rows of a block: 6 with orientation, 3 for positions only.
     #[must_use]
     pub fn rows_per_pose(&self) -> usize {
-        if self.attitude { 6 } else { 3 }
+        if self.orientation { 6 } else { 3 }
     }
 
     /// Writes the block of `joints` (rad or m) to `block` (`rows_per_pose × rank`, row-major); the end point in base, m.
     pub fn block_into(&self, joints: &[f64], scratch: &mut JacobianScratch, block: &mut [f64]) -> Vector3<f64> {
         let end_point = self.jacobian_into(joints, scratch);
-        let (position, attitude) = self.sigmas(&end_point);
+        let (position, orientation) = self.sigmas(&end_point);
         let n = self.chain.parameter_count();
         for (component, row) in block.chunks_exact_mut(self.rank()).enumerate() {
-            let factor = 1.0 / if component < 3 { position } else { attitude };
+            let factor = 1.0 / if component < 3 { position } else { orientation };
             let source = &scratch.rows[component * n..(component + 1) * n];
             for (entry, column) in row.iter_mut().zip(&self.independent) {
                 *entry = factor * source[*column];
@@ -94,16 +94,16 @@ impl InformationModel {
         let alike = |sigma: f64| (sigma - sensor.position_sigma_m).abs() <= 1e-9 * sensor.position_sigma_m;
         match self.weights {
             Weights::Noise => true,
-            Weights::Unit => sensor.position_sigma_per_m == 0.0 && sensor.attitude_sigma_rad.is_none_or(alike),
+            Weights::Unit => sensor.position_sigma_per_m == 0.0 && sensor.orientation_sigma_rad.is_none_or(alike),
         }
     }
 
     /// Scales the rows of the block of a reading at `end_point` by the declared sigmas over the assumed ones: with these rows Y,
     /// the covariance of an estimate is (XᵀX)⁻¹ YᵀY (XᵀX)⁻¹.
     pub fn noise_into(&self, end_point: &Vector3<f64>, block: &mut [f64]) {
-        let (position, attitude) = self.sigmas(end_point);
-        let declared = [self.sensor.position_sigma_at(end_point), self.sensor.attitude_sigma_rad.unwrap_or(attitude)];
-        let factors = [declared[0] / position, declared[1] / attitude];
+        let (position, orientation) = self.sigmas(end_point);
+        let declared = [self.sensor.position_sigma_at(end_point), self.sensor.orientation_sigma_rad.unwrap_or(orientation)];
+        let factors = [declared[0] / position, declared[1] / orientation];
         for (component, row) in block.chunks_exact_mut(self.rank()).enumerate() {
             row.iter_mut().for_each(|entry| *entry *= factors[component / 3]);
         }
@@ -115,7 +115,7 @@ impl InformationModel {
         let or_one = |sigma: f64| if sigma > 0.0 { sigma } else { 1.0 };
         match self.weights {
             Weights::Noise => {
-                (or_one(self.sensor.position_sigma_at(end_point)), or_one(self.sensor.attitude_sigma_rad.unwrap_or(1.0)))
+                (or_one(self.sensor.position_sigma_at(end_point)), or_one(self.sensor.orientation_sigma_rad.unwrap_or(1.0)))
             }
             Weights::Unit => {
                 let position = or_one(self.sensor.position_sigma_m);

@@ -34,3 +34,23 @@ pub struct Indexes {
     /// Singular values taken as nonzero: the dimension of the identifiable subspace.
     pub rank: usize,
 }
+
+/// How the error Jacobian is scaled before its singular values are taken: O1, O3 and all that is made of them depend on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JacobianScaling {
+    /// Metres and radians as they are, all configurations stacked (the paper's reading).
+    Si,
+    /// The same over the root of the number of configurations, so that more configurations alone raise no index.
+    PerPose,
+    /// Every column of length one, so that the parameters' units do not matter.
+    Columns,
+}
+
+/// Which points count as workspace in eq. 25.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EvennessDomain {
+    /// Cells of the grid that the arm's end reaches.
+    Reachable,
+    /// All cells of the cube around them.
+    BoundingCube,
+}

@@ -18,8 +18,8 @@ pub struct PredictionWorkspace {
     rank: usize,
     /// Mean of PᵀP over the sample, position rows (m² per unit of covariance): row-major `rank × rank`.
     position: Vec<f64>,
-    /// The same for the attitude rows (rad²).
-    attitude: Vec<f64>,
+    /// The same for the orientation rows (rad²).
+    orientation: Vec<f64>,
     /// Position rows of the first points, 3 × rank each: those that the G-criterion looks at.
     points: Vec<f64>,
     /// Those of the others, at which what was chosen is judged; the same where there are none.
@@ -31,8 +31,9 @@ pub struct PredictionWorkspace {
 pub struct Prediction {
     /// Root of the mean squared position error over the workspace (3-D), m: the root of the I-criterion.
     pub position_rms_m: f64,
-    /// Root of the mean squared attitude error (rotation vector), rad.
-    pub attitude_rms_rad: f64,
+    /// Root of the mean squared orientation error (rotation vector), rad.
+    #[serde(rename = "attitude_rms_rad")]
+    pub orientation_rms_rad: f64,
     /// Root of the largest mean squared position error at any of some hundred sampled points of the workspace, m. They are others
     /// than those at which the G-criterion is computed.
     pub position_worst_m: f64,
@@ -45,22 +46,22 @@ impl PredictionWorkspace {
         let rank = model.rank();
         let mut rows = vec![0.0; 6 * rank];
         let mut scratch = JacobianScratch::default();
-        let (mut position, mut attitude) = (vec![0.0; rank * rank], vec![0.0; rank * rank]);
+        let (mut position, mut orientation) = (vec![0.0; rank * rank], vec![0.0; rank * rank]);
         let (mut points, mut judged) = (Vec::new(), Vec::new());
         let share = joint_count as f64 / configurations.len().max(1) as f64;
         for (index, joints) in configurations.chunks_exact(joint_count).enumerate() {
             model.unscaled_into(joints, &mut scratch, &mut rows);
             dense::add_gram(&rows[..3 * rank], share, rank, &mut position);
-            dense::add_gram(&rows[3 * rank..], share, rank, &mut attitude);
+            dense::add_gram(&rows[3 * rank..], share, rank, &mut orientation);
             let of = if index < WORST_POINTS { &mut points } else { &mut judged };
             of.extend_from_slice(&rows[..3 * rank]);
         }
         dense::mirror(&mut position, rank);
-        dense::mirror(&mut attitude, rank);
+        dense::mirror(&mut orientation, rank);
         if judged.is_empty() {
             judged.clone_from(&points);
         }
-        PredictionWorkspace { rank, position, attitude, points, judged }
+        PredictionWorkspace { rank, position, orientation, points, judged }
     }
 
     /// L of the I-criterion tr(L M⁻¹): mean of PᵀP over the workspace, position rows; row-major `rank × rank`, both triangles.
@@ -110,7 +111,7 @@ impl PredictionWorkspace {
     fn of_covariance(&self, covariance: &[f64]) -> Prediction {
         Prediction {
             position_rms_m: dense::dot(&self.position, covariance).max(0.0).sqrt(),
-            attitude_rms_rad: dense::dot(&self.attitude, covariance).max(0.0).sqrt(),
+            orientation_rms_rad: dense::dot(&self.orientation, covariance).max(0.0).sqrt(),
             position_worst_m: self.worst(&self.judged, covariance).max(0.0).sqrt(),
         }
     }
@@ -159,7 +160,7 @@ mod tests {
         let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / 30.0;
         let close = |a: f64, b: f64| assert!((a / b.sqrt() - 1.0).abs() < 1e-7, "{a} is not {}", b.sqrt());
         close(prediction.position_rms_m, mean(&mut traces.iter().map(|trace| trace.0)));
-        close(prediction.attitude_rms_rad, mean(&mut traces.iter().map(|trace| trace.1)));
+        close(prediction.orientation_rms_rad, mean(&mut traces.iter().map(|trace| trace.1)));
         close(prediction.position_worst_m, traces.iter().map(|trace| trace.0).fold(0.0, f64::max));
         assert!(workspace.predict(&vec![0.0; rank * rank]).is_none());
     }

@@ -104,13 +104,13 @@ impl Subspace {
         Subspace { share, ..self }
     }
 
-    /// The subspace that `arm`'s structure allows, whatever is measured within its joint limits: full poses if `attitude`, else
+    /// The subspace that `arm`'s structure allows, whatever is measured within its joint limits: full poses if `orientation`, else
     /// positions only.
     #[must_use]
-    pub fn of_structure(arm: &Arm, attitude: bool) -> Subspace {
+    pub fn of_structure(arm: &Arm, orientation: bool) -> Subspace {
         let chain = arm.chain.at_nominal();
         let columns = chain.parameter_count();
-        let rows_per_pose = if attitude { 6 } else { 3 };
+        let rows_per_pose = if orientation { 6 } else { 3 };
         let mut stream = stream(0, "quality/structure");
         let mut stacked = DMatrix::zeros(rows_per_pose * STRUCTURE_SAMPLES.max(columns / 2), columns);
         let samples = stacked.nrows() / rows_per_pose;

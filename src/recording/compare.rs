@@ -10,10 +10,11 @@ use serde_json::Value;
 
 use super::cloud;
 use super::encode::{Encoder, Message};
-use super::event::{Event, Listener, ListenerError, Start};
 use super::read::{Cut, Messages, ReadError, RecordedMessage};
 use super::topic::Topic;
 use crate::arm::Arm;
+use crate::event::{Event, Start};
+use crate::progress::{Progress, Stopped};
 
 /// Takes the events of a repeated run and compares their messages with the recorded ones, in order. The recording is read
 /// alongside, one chunk at a time.
@@ -184,10 +185,10 @@ impl Comparer {
     }
 }
 
-impl Listener for Comparer {
-    fn take(&mut self, event: &Event) -> Result<(), ListenerError> {
-        let messages = self.encoder.encode(event).map_err(|error| ListenerError(error.to_string()))?;
-        messages.iter().try_for_each(|message| self.compare(message)).map_err(|error| ListenerError(error.to_string()))
+impl Progress<&Event> for Comparer {
+    fn report(&mut self, event: &Event) -> Result<(), Stopped> {
+        let messages = self.encoder.encode(event).map_err(|error| Stopped(error.to_string()))?;
+        messages.iter().try_for_each(|message| self.compare(message)).map_err(|error| Stopped(error.to_string()))
     }
 }
 

@@ -8,15 +8,15 @@ use foxglove::messages::{
 };
 
 use super::cloud;
-use super::event::{Event, Start};
 use super::json::Source;
 use super::skeleton::Skeleton;
 use super::topic::Topic;
+use crate::arm::chain::{Chain, ChainAt, Step};
+use crate::arm::frames::Pose;
 use crate::arm::{Arm, Fixture, Geometry, Shape};
 use crate::design::outcome::{DesignOutcome, SearchStep, SwarmIteration};
-use crate::frames::Pose;
+use crate::event::{Event, Start};
 use crate::identification::outcome::Identification;
-use crate::kinematics::chain::{Chain, ChainAt, Step};
 use crate::measurement::Measurement;
 
 /// Simulated time from one event of the design to the next, and around each phase, ns.
@@ -193,13 +193,13 @@ impl Encoder {
         self.check_joints(Topic::Measurement, std::slice::from_ref(&measurement.joints))?;
         messages.protobuf(Topic::Transforms, &self.transforms(&measurement.joints));
         let [x, y, z] = measurement.position_m;
-        let [qx, qy, qz, qw] = measurement.attitude_xyzw.unwrap_or([0.0, 0.0, 0.0, 1.0]);
+        let [qx, qy, qz, qw] = measurement.orientation_xyzw.unwrap_or([0.0, 0.0, 0.0, 1.0]);
         let measured = foxglove::messages::Pose {
             position: Some(Vector3 { x, y, z }),
             orientation: Some(Quaternion { x: qx, y: qy, z: qz, w: qw }),
         };
-        let attitude = nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(qw, qx, qy, qz));
-        self.arm_points(&measurement.joints, Some(&Pose::from_parts([x, y, z].into(), attitude)), messages);
+        let orientation = nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(qw, qx, qy, qz));
+        self.arm_points(&measurement.joints, Some(&Pose::from_parts([x, y, z].into(), orientation)), messages);
         let readings = self.arm.chain.joints.iter().zip(&measurement.joints);
         let joints = readings.map(|(joint, value)| JointState {
             name: joint.name.clone(),

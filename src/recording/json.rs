@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::event::Start;
 use crate::design::outcome::{Advice, DesignOutcome, EvennessDomains, RandomReference, SearchStep, StopReason, SwarmIteration};
 use crate::diagnosis::outcome::Diagnosis;
+use crate::event::Start;
 use crate::identification::outcome::Identification;
 use crate::measurement::Measurement;
 use crate::quality::Indexes;

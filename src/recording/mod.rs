@@ -5,7 +5,6 @@
 
 pub mod compare;
 pub mod encode;
-pub mod event;
 pub mod read;
 pub mod tables;
 pub mod topic;
@@ -19,6 +18,5 @@ mod skeleton;
 mod tests;
 
 pub use compare::{Comparer, Comparison, Difference};
-pub use event::{Event, Listener, ListenerError, Start};
 pub use read::{Cut, Messages, ReadError, Recording, read};
 pub use write::{RecordError, Recorder};

@@ -14,9 +14,9 @@ use mcap::{MAGIC, McapError};
 use prost::Message as _;
 
 use super::cloud;
-use super::event::{Event, Start};
 use super::json::Source;
 use super::topic::Topic;
+use crate::event::{Event, Start};
 
 /// Longest record and longest chunk after decompression that is accepted, bytes: a damaged length must not fill the memory.
 const RECORD_LIMIT: usize = 256 * 1024 * 1024;

@@ -5,8 +5,8 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Point3, Vector3};
 
+use crate::arm::frames::Pose;
 use crate::arm::{Arm, Geometry, Shape};
-use crate::frames::Pose;
 
 /// A point and its colour, red, green, blue, opaque.
 pub(super) type Dot = ([f32; 3], [u8; 4]);

@@ -7,9 +7,11 @@ use nalgebra::Vector3;
 use serde_json::Value;
 
 use super::encode::Encoder;
-use super::event::RealCell;
 use super::topic::Topic;
 use super::*;
+use crate::arm::chain::{Joint, JointKind};
+use crate::arm::frames::{Pose, pose_error};
+use crate::arm::mdh;
 use crate::arm::{Arm, Fixture, Geometry, Link, Shape};
 use crate::design::outcome::{Advice, DesignOutcome, EvennessDomains, RandomReference, SearchStep, StopReason, SwarmIteration};
 use crate::diagnosis::held_out::Block;
@@ -18,11 +20,11 @@ use crate::diagnosis::outcome::{
     Parameters, Place, Undetectable, Unknown, Verdict,
 };
 use crate::effects::Level;
-use crate::frames::{Pose, pose_error};
+use crate::event::RealCell;
+use crate::event::{Event, Start};
 use crate::identification::outcome::{Combination, DeclaredNoise, Errors, Identification, ParameterEstimate, Residual, Summary};
-use crate::kinematics::chain::{Joint, JointKind};
-use crate::kinematics::mdh;
 use crate::measurement::{Measurement, Role};
+use crate::progress::Progress as _;
 use crate::quality::Indexes;
 use crate::quality::prediction::Prediction;
 use crate::seed::{Stream, stream};
@@ -106,7 +108,7 @@ fn events(size: &Size) -> Vec<Event> {
                 base_link: Some("base_link".to_owned()),
                 tip_link: Some("tool".to_owned()),
                 position_sigma_m: 2e-5,
-                attitude_sigma_rad: 1.0 / 3e4,
+                orientation_sigma_rad: 1.0 / 3e4,
             }),
         }),
         Event::Note("a note".to_owned()),
@@ -160,7 +162,7 @@ fn events(size: &Size) -> Vec<Event> {
             joints,
             temperatures_c: if index % 2 == 0 { vec![22.0, 22.5] } else { Vec::new() },
             position_m: (pose.translation.vector.map(|value| value + stream.uniform(-1e-3, 1e-3))).into(),
-            attitude_xyzw: (index % 3 != 0).then(|| pose.rotation.coords.into()),
+            orientation_xyzw: (index % 3 != 0).then(|| pose.rotation.coords.into()),
             // The last one as earlier versions recorded it.
             approach: if index + 1 < size.measurements { vec![-1, 0, 1] } else { Vec::new() },
             ambient_c: (index % 2 == 0).then_some(21.5),
@@ -342,7 +344,7 @@ fn searched(size: &Size, steps: usize) -> Vec<Event> {
             outcome.stop = StopReason::BudgetSpent;
             let prediction = |scale: f64| Prediction {
                 position_rms_m: 1e-5 * scale / 3.0,
-                attitude_rms_rad: 1e-5 / 7.0,
+                orientation_rms_rad: 1e-5 / 7.0,
                 position_worst_m: 4e-5 / 3.0,
             };
             outcome.advice = Some(Advice {
@@ -364,7 +366,7 @@ fn searched(size: &Size, steps: usize) -> Vec<Event> {
 fn record(directory: &Path, events: &[Event]) -> PathBuf {
     let mut recorder = Recorder::create(directory, "run", &arm()).unwrap();
     for event in events {
-        recorder.take(event).unwrap();
+        recorder.report(event).unwrap();
     }
     recorder.finish().unwrap()
 }
@@ -571,7 +573,7 @@ fn a_killed_run_leaves_its_last_chunks_and_the_earlier_recording() {
     let whole = fs::read(record(directory.path(), &events)).unwrap();
     let mut recorder = Recorder::create(directory.path(), "run", &arm()).unwrap();
     for event in &events[..20] {
-        recorder.take(event).unwrap();
+        recorder.report(event).unwrap();
     }
     // What SIGKILL leaves: nothing that was buffered is written any more.
     std::mem::forget(recorder);
@@ -615,9 +617,9 @@ fn records_until_it_is_killed() {
     let directory = PathBuf::from(std::env::var("KINCAL_KILL_TEST").unwrap());
     let mut recorder = Recorder::create(&directory, "run", &arm()).unwrap();
     let events = events(&SMALL);
-    events[..26].iter().for_each(|event| recorder.take(event).unwrap());
+    events[..26].iter().for_each(|event| recorder.report(event).unwrap());
     loop {
-        recorder.take(&events[25]).unwrap();
+        recorder.report(&events[25]).unwrap();
     }
 }
 
@@ -627,7 +629,7 @@ fn a_run_that_fails_keeps_all_it_had_and_does_not_look_whole() {
     let events = events(&SMALL);
     let mut recorder = Recorder::create(directory.path(), "run", &arm()).unwrap();
     for event in &events[..20] {
-        recorder.take(event).unwrap();
+        recorder.report(event).unwrap();
     }
     drop(recorder);
     let recording = read(&directory.path().join("run.partial.mcap")).unwrap();
@@ -725,7 +727,7 @@ fn what_cannot_be_read_back_is_refused() {
 
 fn replay(path: &Path, events: &[Event]) -> Comparison {
     let mut comparer = Comparer::open(path, &arm()).unwrap();
-    events.iter().for_each(|event| comparer.take(event).unwrap());
+    events.iter().for_each(|event| comparer.report(event).unwrap());
     comparer.finish().unwrap()
 }
 
@@ -791,7 +793,7 @@ fn a_change_in_the_last_bit_is_found_and_named() {
             31,
             |event| {
                 if let Event::Measured(measurement) = event {
-                    measurement.attitude_xyzw = None
+                    measurement.orientation_xyzw = None
                 }
             },
             "/measurement[",
@@ -981,7 +983,7 @@ fn a_measurement_without_conditions_reads_as_without() {
     };
     assert_eq!(keys(&expected), ["index", "joints", "pose_id", "position_m", "role", "temperatures_c", "time_s"]);
     let all = Measurement {
-        attitude_xyzw: Some([0.0, 0.0, 0.0, 1.0]),
+        orientation_xyzw: Some([0.0, 0.0, 0.0, 1.0]),
         approach: vec![1, -1],
         ambient_c: Some(20.0),
         payload_kg: Some(5.0),

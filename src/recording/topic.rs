@@ -33,7 +33,7 @@ pub enum Topic {
     Measurement,
     /// Its joint readings, by joint name.
     JointReadings,
-    /// Its measured tool pose; identity attitude where the sensor sees positions only.
+    /// Its measured tool pose; identity orientation where the sensor sees positions only.
     PoseMeasured,
     /// Its tool pose at the joint readings (nominal arm).
     PoseNominal,

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::cell::Truth;
-use crate::cell::truth::{TrueEffect, TrueParameter, TruePose};
+use crate::simulation::cell::Truth;
+use crate::simulation::cell::truth::{TrueEffect, TrueParameter, TruePose};
 
 /// The file as it stands: TOML, the scene's `[injected]` section first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -10,9 +10,10 @@ use mcap::write::NoSeek;
 use mcap::{McapError, WriteOptions, Writer};
 
 use super::encode::{EncodeError, Encoder, Message};
-use super::event::{Event, Listener, ListenerError};
 use super::topic::Topic;
 use crate::arm::Arm;
+use crate::event::Event;
+use crate::progress::{Progress, Stopped};
 
 /// Uncompressed size at which a chunk is closed after the current event, bytes.
 const CHUNK_BYTES: usize = 1024 * 1024;
@@ -236,9 +237,9 @@ impl Recorder {
     }
 }
 
-impl Listener for Recorder {
-    fn take(&mut self, event: &Event) -> Result<(), ListenerError> {
-        self.record(event).map_err(|error| ListenerError(error.to_string()))
+impl Progress<&Event> for Recorder {
+    fn report(&mut self, event: &Event) -> Result<(), Stopped> {
+        self.record(event).map_err(|error| Stopped(error.to_string()))
     }
 }
 

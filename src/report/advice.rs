@@ -1,8 +1,9 @@
 //! What choosing is worth, told before anything is measured.
 
-use super::{number, table};
+use super::table;
 use crate::design::outcome::{Advice, DesignOutcome};
 use crate::quality::prediction::Prediction;
+use crate::units::number;
 
 /// Gains smaller than this share are not worth the choosing.
 const HARDLY: f64 = 0.1;
@@ -21,7 +22,7 @@ pub(super) fn section(outcome: &DesignOutcome, advice: &Advice) -> String {
             of(&|p| p.position_rms_m * 1e3),
             range,
             percent(gain),
-            of(&|p| p.attitude_rms_rad.to_degrees()),
+            of(&|p| p.orientation_rms_rad.to_degrees()),
             of(&|p| p.position_worst_m * 1e3),
         ]
     };
@@ -35,7 +36,7 @@ pub(super) fn section(outcome: &DesignOutcome, advice: &Advice) -> String {
         bound,
     ];
     let header =
-        ["error that noise will leave", "RMS (mm)", "min … max", "gain on random (%)", "attitude (°)", "worst of 300 (mm)"];
+        ["error that noise will leave", "RMS (mm)", "min … max", "gain on random (%)", "orientation (°)", "worst of 300 (mm)"];
     let mut text = format!("\nPosition error that noise will leave over the workspace:\n{}\n", table(&header, rows));
     if advice.random_undetermined > 0 {
         let undetermined = advice.random_undetermined;
@@ -123,7 +124,7 @@ mod tests {
     }
 
     fn prediction(position_rms_m: f64) -> Prediction {
-        Prediction { position_rms_m, attitude_rms_rad: 0.01f64.to_radians(), position_worst_m: 2.0 * position_rms_m }
+        Prediction { position_rms_m, orientation_rms_rad: 0.01f64.to_radians(), position_worst_m: 2.0 * position_rms_m }
     }
 
     /// The section for errors of a random and a chosen set and the bound, mm.

@@ -1,8 +1,8 @@
 //! The score of a diagnosis: tables for people, one for CSV, and the reliability plot.
 
 use super::table;
-use crate::experiments::challenge::score::{ANY, Confusion, LAMBDA, NOT_THERE, Restored, Score, Single};
 use crate::figure::{Axis, Colour, Estimate, Figure, Kind, Panel, Series};
+use crate::lab::challenge::score::{ANY, Confusion, LAMBDA, NOT_THERE, Restored, Score, Single};
 
 /// `97 % (31/32)`.
 fn share(part: usize, of: usize) -> String {

@@ -1,8 +1,9 @@
 //! What the physics says of a diagnosis, for people: the same waterfall from formulas and from the simulated arm.
 
 use super::diagnosis::place;
-use super::{micrometres as um, table};
-use crate::experiments::confirm::{Answer, Confirmation};
+use super::table;
+use crate::lab::confirm::{Answer, Confirmation};
+use crate::units::micrometres as um;
 
 /// The part of the report that comes under the diagnosis.
 #[must_use]

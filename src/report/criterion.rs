@@ -1,7 +1,7 @@
 //! What a criterion's value means to people.
 
-use super::number;
-use crate::scene::Criterion;
+use crate::design::problem::Criterion;
+use crate::units::number;
 
 /// How values of a criterion are told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,9 +1,10 @@
 //! A diagnosis for people: the verdict in a sentence, the waterfall, the causes, where, and what to measure next.
 
-use super::{number, table};
+use super::table;
 use crate::diagnosis::held_out::Block;
 use crate::diagnosis::outcome::{Candidate, Diagnosis, Map, NoiseSource, Place};
 use crate::effects::Level;
+use crate::units::number;
 
 /// The whole report.
 #[must_use]

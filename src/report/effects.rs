@@ -2,10 +2,11 @@
 
 use serde_json::{Value, json};
 
-use super::{number, table};
+use super::table;
 use crate::effects::{Kind, Level};
-use crate::experiments::effect_validation::{Line, MARK_M, MARK_POSES_PER_S, MARK_RELATIVE, MARK_SETTLING_M};
+use crate::lab::effect_validation::{Line, MARK_M, MARK_POSES_PER_S, MARK_RELATIVE, MARK_SETTLING_M};
 use crate::scene::effect_file::{KINDS, KindKeys};
+use crate::units::number;
 
 /// An effect that a scene may inject: kind, where it sits, unit of its magnitude, and what is realistic at about 1 m of reach.
 struct Entry {

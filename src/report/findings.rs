@@ -1,7 +1,8 @@
 //! What experiments found, for people as tables and for programs as CSV.
 
-use super::{number, table};
-use crate::experiments::findings::{Claim, Data, Findings};
+use super::table;
+use crate::lab::reproduce::findings::{Claim, Data, Findings};
+use crate::units::number;
 
 /// The published numbers beside ours, the verdict, and what was assumed.
 #[must_use]

@@ -16,7 +16,8 @@ use comfy_table::{Cell, CellAlignment, LineStyle, Table, TableStyle};
 use crate::design::outcome::{DesignOutcome, StopReason};
 use crate::identification::outcome::{Errors, Identification, Summary};
 use crate::quality::Indexes;
-use crate::scene::JacobianScaling;
+use crate::quality::JacobianScaling;
+use crate::units::number;
 use criterion::Words;
 
 /// Lines above and below, and one under the header.
@@ -125,7 +126,7 @@ pub struct SettlingReport {
 
 /// Tells how the poses of a run settled.
 #[must_use]
-pub fn settling(truth: &crate::cell::Truth) -> SettlingReport {
+pub fn settling(truth: &crate::simulation::cell::Truth) -> SettlingReport {
     let poses = &truth.poses;
     let settled = poses.iter().filter(|pose| pose.settled).count();
     let worst = poses.iter().map(|pose| pose.settling_error_m).fold(0.0, f64::max);
@@ -158,7 +159,8 @@ pub fn identification(identification: &Identification) -> String {
     };
     add("fitted", Some(&identification.nominal), Some(&identification.fitted));
     add("held out", identification.held_out_nominal.as_ref(), identification.held_out.as_ref());
-    let header = ["configurations, model", "position mean (mm)", "RMS", "min", "max", "attitude mean (°)", "RMS", "min", "max"];
+    let header =
+        ["configurations, model", "position mean (mm)", "RMS", "min", "max", "orientation mean (°)", "RMS", "min", "max"];
     let mut text = table(&header, rows);
     let dropped = identification.parameters.iter().filter(|parameter| parameter.dropped).count();
     text.push_str(&format!(
@@ -226,23 +228,4 @@ pub fn combinations(identification: &Identification) -> String {
         })
         .collect();
     table(&["identifiable combination", "unit", "change", "standard error", "95 % from", "to"], rows)
-}
-
-/// A length in micrometres, without its unit; what is below a nanometre is only said to be.
-pub(crate) fn micrometres(metres: f64) -> String {
-    if metres > 0.0 && metres < 1e-9 { "< 0.001".to_owned() } else { number(metres * 1e6) }
-}
-
-/// Four significant digits, in plain notation where that is readable.
-#[must_use]
-pub fn number(value: f64) -> String {
-    let size = value.abs();
-    if value == 0.0 {
-        "0".to_owned()
-    } else if !(1e-4..1e6).contains(&size) {
-        format!("{value:.3e}")
-    } else {
-        let before = (libm::floor(libm::log10(size)) as i32 + 1).max(0);
-        format!("{value:.*}", usize::try_from((4 - before).clamp(0, 6)).unwrap_or(0))
-    }
 }

@@ -1,9 +1,10 @@
 //! Stated and measured minimum detectable magnitudes: a table and a figure.
 
-use super::{number, table};
-use crate::experiments::challenge::power::{Curve, Report};
-use crate::experiments::injection::{Sort, units};
+use super::table;
 use crate::figure::{Axis, Colour, Estimate, Figure, Kind, Panel, Series};
+use crate::lab::challenge::power::{Curve, Report};
+use crate::lab::injection::{Sort, units};
+use crate::units::number;
 
 fn unit(curve: &Curve) -> (&'static str, f64) {
     units(Sort::Known(curve.kind))[0]

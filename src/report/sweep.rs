@@ -1,12 +1,13 @@
 //! What a sweep found: a table for people, tables for CSV, and a figure.
 
-use super::{number, table};
-use crate::experiments::findings::Data;
-use crate::experiments::injection::{Sort, units};
-use crate::experiments::statistics::Mean;
-use crate::experiments::sweep::grid::{AS_THE_SCENE, NOTHING};
-use crate::experiments::sweep::{Cell, CellSummary};
+use super::table;
 use crate::figure::{Axis, Colour, Estimate, Figure, Kind, Panel, Series};
+use crate::lab::injection::{Sort, units};
+use crate::lab::reproduce::findings::Data;
+use crate::lab::sweep::grid::{AS_THE_SCENE, NOTHING};
+use crate::lab::sweep::{Cell, CellSummary};
+use crate::statistics::Mean;
+use crate::units::number;
 
 /// One more axis of the grid.
 struct Column {
@@ -231,7 +232,7 @@ pub fn figure(scene: &str, cells: &[CellSummary]) -> Figure {
         if !single || cell.what.effect == AS_THE_SCENE {
             parts.push(cell.what.effect.clone());
         }
-        parts.extend(cell.what.location.map(crate::experiments::sweep::grid::place_written));
+        parts.extend(cell.what.location.map(crate::lab::sweep::grid::place_written));
         parts.extend(columns.iter().map(|column| format!("{} {}", column.name, (column.get)(&cell.what))));
         let name = parts.join(", ");
         match lines.iter_mut().find(|(other, _)| *other == name) {

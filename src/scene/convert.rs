@@ -2,20 +2,22 @@
 
 use nalgebra::{Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 
+use super::Scene;
 use super::effect_file;
 use super::error::{Invalid, suggestion};
 use super::file::*;
 use super::urdf;
-use super::{
-    Approach, DesignProblem, EvennessDomain, Injected, JacobianScaling, Noise, Plan, Scene, Swarm, Temperature, ThermalProfile,
-    Weights,
-};
+use crate::arm::frames::Pose;
+use crate::arm::mdh::{self, Frame, SixParameters};
+use crate::arm::urdf::rpy::{rotation_from_rpy, z_onto};
 use crate::arm::{Arm, Fixture, Geometry, Inertial, Link, Shape};
-use crate::frames::Pose;
-use crate::kinematics::mdh::{self, Frame, SixParameters};
-use crate::kinematics::urdf::rpy::{rotation_from_rpy, z_onto};
-use crate::kinematics::{Chain, Joint, JointKind, Quantity, Step};
+use crate::arm::{Chain, Joint, JointKind, Quantity, Step};
+use crate::design::problem::{DesignProblem, Swarm};
+use crate::measurement::Weights;
 use crate::measurement::{Sensor, View};
+use crate::quality::{EvennessDomain, JacobianScaling};
+use crate::simulation::injected::{Injected, Noise};
+use crate::simulation::plan::{Approach, Plan, Temperature, ThermalProfile};
 
 pub(super) type Checked<T> = Result<T, Invalid>;
 
@@ -46,7 +48,7 @@ pub(super) fn scene(file: &SceneToml) -> Checked<Scene> {
     if weights == Weights::Noise {
         let unweighable = [
             ("sensor.position_noise_um", sensor.position_sigma_m),
-            ("sensor.attitude_noise_deg", sensor.attitude_sigma_rad.unwrap_or(1.0)),
+            ("sensor.attitude_noise_deg", sensor.orientation_sigma_rad.unwrap_or(1.0)),
         ];
         if let Some((key, _)) = unweighable.iter().find(|(_, sigma)| *sigma == 0.0) {
             return Err(Invalid::new(
@@ -409,8 +411,8 @@ fn sensor(file: &SensorToml) -> Checked<Sensor> {
         position_in_base: point_from_mm(&file.position_mm),
         position_sigma_m: metres_from_um(declared_noise(file.position_noise_um, "sensor.position_noise_um")?),
         position_sigma_per_m: metres_from_um(not_negative(file.position_noise_um_per_m, "sensor.position_noise_um_per_m")?),
-        attitude_sigma_rad: file
-            .attitude_noise_deg
+        orientation_sigma_rad: file
+            .orientation_noise_deg
             .map(|degrees| declared_noise(degrees, "sensor.attitude_noise_deg").map(f64::to_radians))
             .transpose()?,
         temperature_sigma_k: file
@@ -444,7 +446,7 @@ fn view(file: &ViewToml, position_mm: &[f64; 3]) -> Checked<View> {
 
 fn design(file: &DesignToml, arm: &Arm, sensor: &Sensor) -> Checked<DesignProblem> {
     let parameters = arm.chain.parameters.len();
-    let (equations, seen) = if sensor.attitude_sigma_rad.is_some() { (6, "a pose") } else { (3, "a position") };
+    let (equations, seen) = if sensor.orientation_sigma_rad.is_some() { (6, "a pose") } else { (3, "a position") };
     let least = parameters.div_ceil(equations);
     if file.count < least {
         return Err(Invalid::new(
@@ -704,7 +706,7 @@ fn noise(file: &NoiseToml) -> Checked<Noise> {
     let given = [
         ("factor", file.factor.is_some(), file.kind == NoiseKindToml::Declared),
         ("position_mm", file.position_mm.is_some(), file.kind == NoiseKindToml::Uniform),
-        ("attitude_deg", file.attitude_deg.is_some(), file.kind == NoiseKindToml::Uniform),
+        ("attitude_deg", file.orientation_deg.is_some(), file.kind == NoiseKindToml::Uniform),
     ];
     if let Some((name, ..)) = given.iter().find(|(_, given, fits)| *given && !fits) {
         return Err(Invalid::new(
@@ -729,7 +731,7 @@ fn noise(file: &NoiseToml) -> Checked<Noise> {
         }
         NoiseKindToml::Uniform => Noise::Uniform {
             position_m: metres_from_mm(required(file.position_mm, "position_mm")?),
-            attitude_rad: required(file.attitude_deg, "attitude_deg")?.to_radians(),
+            orientation_rad: required(file.orientation_deg, "attitude_deg")?.to_radians(),
         },
         NoiseKindToml::Off => Noise::Off,
     })

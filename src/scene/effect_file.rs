@@ -3,11 +3,12 @@
 use nalgebra::Vector3;
 
 use super::convert::{Checked, at_most, each_link, not_negative, positive};
-use super::effect::Effect;
 use super::error::{Invalid, suggestion};
 use super::file::{EffectToml, OneOrEach};
 use crate::arm::Arm;
-use crate::kinematics::JointKind;
+use crate::arm::JointKind;
+use crate::simulation::effect::Effect;
+use crate::units::ARCSEC;
 
 /// What a kind of effect sits on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -137,7 +138,6 @@ impl KindKeys {
 /// Largest play of a turn, rad, and of a shift, m: beyond these a unit was probably mistaken.
 const LARGEST_TURN_URAD: f64 = 1e4;
 const LARGEST_SHIFT_UM: f64 = 1e3;
-const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 /// The play above, in arc seconds.
 const LARGEST_TURN_ARCSEC: f64 = 2060.0;
 

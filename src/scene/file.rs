@@ -10,8 +10,9 @@ use std::fmt;
 use serde::de::{self, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::effect::Moves;
-use super::{ApproachPolicy, Criterion, Method};
+use crate::design::problem::{Criterion, Method};
+use crate::simulation::effect::Moves;
+use crate::simulation::plan::ApproachPolicy;
 
 /// The whole file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -100,10 +101,10 @@ fn standard_gravity() -> [f64; 3] {
 /// Conventions for frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Convention {
-    /// `Rot(x, alpha) Trans(x, a) Rot(z, theta) Trans(z, d) Rot(y, beta)`; see [`crate::kinematics::mdh`].
+    /// `Rot(x, alpha) Trans(x, a) Rot(z, theta) Trans(z, d) Rot(y, beta)`; see [`crate::arm::mdh`].
     #[serde(rename = "mdh5")]
     Mdh5,
-    /// A URDF, with six parameters for every joint that moves and for the tool; see [`crate::kinematics::urdf::import`].
+    /// A URDF, with six parameters for every joint that moves and for the tool; see [`crate::arm::urdf::import`].
     #[serde(rename = "urdf")]
     Urdf,
 }
@@ -285,9 +286,10 @@ pub struct SensorToml {
     /// Growth of the position noise with distance, µm per m. Default: 0.
     #[serde(default)]
     pub position_noise_um_per_m: f64,
-    /// Attitude noise per axis, degrees. Absent: the sensor sees positions only.
+    /// Orientation noise per axis, degrees. Absent: the sensor sees positions only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub attitude_noise_deg: Option<f64>,
+    #[serde(rename = "attitude_noise_deg")]
+    pub orientation_noise_deg: Option<f64>,
     /// Noise of the temperature sensors on the moving links, K. Absent: there are none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_noise_k: Option<f64>,
@@ -728,7 +730,8 @@ pub struct NoiseToml {
     pub position_mm: Option<f64>,
     /// With `uniform`: half width per axis, degrees. Required there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub attitude_deg: Option<f64>,
+    #[serde(rename = "attitude_deg")]
+    pub orientation_deg: Option<f64>,
 }
 
 /// Kinds of noise.

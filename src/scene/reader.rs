@@ -9,8 +9,10 @@ use super::convert;
 use super::error::{Invalid, Located, Problem, SceneError, in_our_words};
 use super::file::{InjectedOnlyToml, SceneToml, WeightsToml};
 use super::magnitude::too_large;
-use super::{Injected, Method, Scene, urdf};
+use super::{Scene, urdf};
 use crate::arm::Arm;
+use crate::design::problem::Method;
+use crate::simulation::injected::Injected;
 
 /// A scene as read: validated, with the file's own values kept for writing them again.
 #[derive(Clone, Debug)]

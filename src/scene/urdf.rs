@@ -4,9 +4,9 @@ use std::path::Path;
 
 use super::error::Invalid;
 use super::file::{ArmToml, Convention};
+use crate::arm::urdf::{self, Imported, UrdfError};
 use crate::arm::{Arm, Geometry, Link};
-use crate::kinematics::urdf::{self, Imported, UrdfError};
-use crate::kinematics::{JointKind, Quantity};
+use crate::arm::{JointKind, Quantity};
 
 /// Largest length (m), angle (rad), mass (kg) and moment of inertia (kg·m²) that are taken for meant, as everywhere in a scene.
 const LARGEST_LENGTH_M: f64 = 100.0;

@@ -6,9 +6,9 @@ use rerun::{
 };
 
 use super::viewer::ViewerError;
+use crate::arm::ChainAt;
+use crate::arm::frames::Pose;
 use crate::arm::{Arm, Geometry, Shape};
-use crate::frames::Pose;
-use crate::kinematics::ChainAt;
 
 /// Colours of the links, base first, in turn: calm, and different enough to tell neighbours apart.
 const LINKS: [[u8; 3]; 4] = [[124, 138, 158], [176, 188, 204], [146, 164, 170], [198, 204, 196]];
@@ -41,7 +41,7 @@ impl Body {
             .collect::<Result<_, _>>()?;
         let chain = arm.chain.at_nominal();
         let stretch: f64 = chain.segments().iter().map(|segment| segment.translation.vector.norm()).sum();
-        let slide = arm.chain.joints.iter().filter(|joint| joint.kind == crate::kinematics::JointKind::Prismatic);
+        let slide = arm.chain.joints.iter().filter(|joint| joint.kind == crate::arm::JointKind::Prismatic);
         let stretch = stretch + slide.map(|joint| (joint.upper - joint.lower).min(10.0)).sum::<f64>();
         // An arm without any length is still to be looked at from somewhere.
         let stretch = if stretch > 1e-3 { stretch } else { 1.0 };

@@ -6,8 +6,8 @@ use rerun::{LineStrips2D, Points2D, Radius, RecordingStream, RecordingStreamResu
 
 use super::summary::significant;
 use crate::arm::Arm;
+use crate::arm::JointKind;
 use crate::identification::outcome::Residual;
-use crate::kinematics::JointKind;
 use crate::measurement::Measurement;
 
 /// Size of a panel, and from one to the next.
@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn what_one_joint_did_shows_in_its_panel_in_full() {
-        let arm = crate::experiments::arms::arms().unwrap().swap_remove(0).scene.arm;
+        let arm = crate::lab::reproduce::arms::arms().unwrap().swap_remove(0).scene.arm;
         let (chain, joint, turned) = (arm.chain.at_nominal(), 2, 1e-6);
         let (mut measurements, mut residuals, mut shifts) = (Vec::new(), Vec::new(), Vec::new());
         for index in 0..20 {

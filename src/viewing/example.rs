@@ -7,17 +7,18 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::{Target, Viewer, ViewerError, open};
+use crate::arm::frames::{Pose, pose_error, rotation_from_vector};
+use crate::arm::mdh::{Frame, chain};
 use crate::arm::{Arm, Fixture, Geometry, Inertial, Link, Shape};
+use crate::arm::{Joint, JointKind, Quantity};
 use crate::design::outcome::{Advice, DesignOutcome, EvennessDomains, RandomReference, SearchStep, StopReason, SwarmIteration};
-use crate::frames::{Pose, pose_error, rotation_from_vector};
+use crate::design::problem::{Criterion, DesignProblem, Method};
+use crate::event::{Event, Start};
 use crate::identification::outcome::{DeclaredNoise, Errors, Identification, ParameterEstimate, Residual, Summary};
-use crate::kinematics::mdh::{Frame, chain};
-use crate::kinematics::{Joint, JointKind, Quantity};
 use crate::measurement::{Measurement, Role};
+use crate::progress::Progress as _;
 use crate::quality::Indexes;
 use crate::quality::prediction::Prediction;
-use crate::recording::event::{Event, Listener, Start};
-use crate::scene::{Criterion, DesignProblem, Method};
 use crate::seed::stream;
 
 const JOINTS: usize = 8;
@@ -201,7 +202,7 @@ fn events(particles: usize, count: usize, iterations: usize, held_out: usize) ->
                 .map(|link| 22.0 + 4.0 * (1.0 - libm::exp(-(index as f64) / 20.0)) / (1.0 + link as f64))
                 .collect(),
             position_m: measured.translation.vector.into(),
-            attitude_xyzw: Some([q.i, q.j, q.k, q.w]),
+            orientation_xyzw: Some([q.i, q.j, q.k, q.w]),
             joints: joints.clone(),
             approach: (0..JOINTS).map(|joint| if (index + joint) % 2 == 0 { 1 } else { -1 }).collect(),
             ambient_c: Some(21.0 + 0.02 * index as f64),
@@ -251,7 +252,7 @@ fn events(particles: usize, count: usize, iterations: usize, held_out: usize) ->
         held_out_nominal: Some(errors(|r| &r.nominal, verify)),
         declared_noise: DeclaredNoise { position_m: 5e-5, rotation_rad: Some(1e-4) },
         residuals: residuals.clone(),
-        notes: vec!["attitude weighted by its declared sigma".to_owned()],
+        notes: vec!["orientation weighted by its declared sigma".to_owned()],
     }));
     events.push(Event::Note("identified".to_owned()));
     (arm, events)
@@ -274,7 +275,7 @@ fn searched(count: usize, steps: usize, held_out: usize) -> (Arm, Vec<Event>) {
     events[1] = Event::Note("design by coordinate exchange, seed 1".to_owned());
     let prediction = |position_rms_m: f64| Prediction {
         position_rms_m,
-        attitude_rms_rad: 0.3 * position_rms_m,
+        orientation_rms_rad: 0.3 * position_rms_m,
         position_worst_m: 1.6 * position_rms_m,
     };
     let mut configurations = Vec::new();
@@ -330,7 +331,7 @@ fn problem(events: &[Event]) -> DesignProblem {
 fn write(path: &Path, arm: &Arm, events: &[Event]) {
     let mut viewer = open(&Target::File(path.to_owned()), arm, Some(&problem(events)), "example").unwrap().unwrap();
     for event in events {
-        viewer.take(event).unwrap();
+        viewer.report(event).unwrap();
     }
     viewer.finish().unwrap();
 }
@@ -395,7 +396,7 @@ fn a_viewer_that_takes_nothing_holds_up_no_run() {
     let since = std::time::Instant::now();
     let mut viewer = open(&Target::Connect(Some(url)), &arm, Some(&problem(&events)), "example").unwrap().unwrap();
     for event in &events {
-        viewer.take(event).unwrap();
+        viewer.report(event).unwrap();
     }
     assert!(matches!(viewer.finish(), Err(ViewerError::Lost { .. })));
     assert!(since.elapsed().as_secs_f64() < 12.0, "{:?}", since.elapsed());
@@ -416,7 +417,7 @@ fn live() {
     let mut slowest = std::time::Duration::ZERO;
     for event in &events {
         let since = std::time::Instant::now();
-        viewer.take(event).unwrap();
+        viewer.report(event).unwrap();
         slowest = slowest.max(since.elapsed());
         std::thread::sleep(std::time::Duration::from_millis(40));
     }

@@ -18,8 +18,8 @@ use rerun::external::re_sdk_types::datatypes::{Float32, Float64, Range1D, Range2
 use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
 
 use super::{by_joint, chart, diagnosis, picture};
+use crate::design::problem::Method;
 use crate::report::criterion::Words;
-use crate::scene::Method;
 
 const BACKGROUND: [u8; 3] = [20, 22, 28];
 
@@ -244,7 +244,7 @@ fn tree(parts: Parts, camera: Camera, joints: usize) -> Node {
     let search =
         |words: Words| tabs(vec![plot(&capital(words.quantity()), &["/search/criterion/**"], true), effort("/search/effort/**")]);
     let position = error_chart("Position error", "/errors/position/**");
-    let attitude = error_chart("Attitude error", "/errors/attitude/**");
+    let orientation = error_chart("Orientation error", "/errors/attitude/**");
     let by_joint =
         || drawing("What is left, joint by joint: came up (amber), down (blue)", "/errors/by_joint/**", by_joint::bounds(joints));
     let conditions = || {
@@ -264,17 +264,17 @@ fn tree(parts: Parts, camera: Camera, joints: usize) -> Node {
         (Choosing::Swarm(words), true) => columns(vec![
             (4.0, rows(vec![(10.0, cell), (5.0, indexes()), (4.0, fitness(words))])),
             (4.0, rows(vec![(1.0, residuals()), (1.0, tabs(vec![swarm(), by_joint()]))])),
-            (3.0, rows(vec![(2.0, side), (1.0, tabs([position, attitude].into_iter().chain(conditions()).collect()))])),
+            (3.0, rows(vec![(2.0, side), (1.0, tabs([position, orientation].into_iter().chain(conditions()).collect()))])),
         ]),
         (Choosing::Search(words), false) => columns(vec![(2.0, rows(vec![(3.0, cell), (2.0, search(words))])), (1.0, side)]),
         (Choosing::Search(words), true) => columns(vec![
             (4.0, rows(vec![(10.0, cell), (6.0, search(words))])),
-            (4.0, rows(vec![(10.0, residuals()), (6.0, tabs(vec![by_joint(), position, attitude]))])),
+            (4.0, rows(vec![(10.0, residuals()), (6.0, tabs(vec![by_joint(), position, orientation]))])),
             (3.0, rows(vec![(2.0, side), (1.0, tabs(conditions()))])),
         ]),
         (Choosing::Not, _) => {
             let scenes = columns(vec![(1.0, cell), (1.0, residuals())]);
-            let charts = columns(vec![(3.0, by_joint()), (2.0, tabs(vec![position, attitude]))]);
+            let charts = columns(vec![(3.0, by_joint()), (2.0, tabs(vec![position, orientation]))]);
             columns(vec![
                 (8.0, rows(vec![(5.0, scenes), (3.0, charts)])),
                 (3.0, rows(vec![(2.0, side), (1.0, tabs(conditions()))])),

@@ -23,14 +23,14 @@ use super::layout::{self, Camera, Choosing, Parts};
 use super::summary::{Summary, significant};
 use super::viewer::ViewerError;
 use crate::arm::Arm;
+use crate::arm::frames::{Pose, pose_error};
 use crate::design::outcome::{DesignOutcome, SearchStep, SwarmIteration};
-use crate::frames::{Pose, pose_error};
+use crate::design::problem::{DesignProblem, Method};
+use crate::event::{Event, Start};
 use crate::identification::outcome::{Identification, Residual};
 use crate::measurement::{Measurement, Role};
 use crate::quality::Indexes;
-use crate::recording::event::{Event, Start};
 use crate::report::criterion::Words;
-use crate::scene::{DesignProblem, Method};
 
 /// The application in the viewer, which keeps one layout for each.
 pub(super) const APPLICATION: &str = "kincal";
@@ -291,10 +291,10 @@ impl Picture {
         stream.set_time_sequence(POSES, measurement.index as i64);
         stream.set_duration_secs(TIME, measurement.time_s);
         self.body.log_configuration(stream, &measurement.joints)?;
-        let attitude = measurement.attitude();
-        let measured = Pose::from_parts(measurement.position().coords.into(), attitude.unwrap_or_default());
+        let orientation = measurement.orientation();
+        let measured = Pose::from_parts(measurement.position().coords.into(), orientation.unwrap_or_default());
         stream.log("world/measured/now", &transform(&measured))?;
-        if attitude.is_some() {
+        if orientation.is_some() {
             stream.log("world/measured/now", &TransformAxes3D::new((0.09 * self.body.stretch) as f32))?;
         }
         self.roles.insert(measurement.index, measurement.role);
@@ -302,12 +302,12 @@ impl Picture {
             stream.log("world/measured/predicted", &transform(&predicted))?;
             stream.log("world/measured/predicted", &TransformAxes3D::new((0.05 * self.body.stretch) as f32))?;
             let mut difference: [f64; 6] = pose_error(&measured, &predicted).into();
-            if attitude.is_none() {
+            if orientation.is_none() {
                 difference[3..].fill(0.0);
             }
             // Measured and predicted poses are too close to be told apart in the cell: a label says how far they are.
             let mut label = format!("{} mm", significant(length(&difference[..3]) * 1e3, 3));
-            if attitude.is_some() {
+            if orientation.is_some() {
                 label += &format!(", {}°", significant(length(&difference[3..]).to_degrees(), 3));
             }
             let here = Points3D::new([point(&measured.translation.vector)])
@@ -411,8 +411,8 @@ impl Picture {
             ("after, held out", HELD_OUT, Role::HeldOut, |r| &r.identified),
         ];
         let position: fn(&[f64; 6]) -> f64 = |six| length(&six[..3]);
-        let attitude: fn(&[f64; 6]) -> f64 = |six| length(&six[3..]).to_degrees();
-        for (path, unit, error) in [("errors/position", Unit::Metre, position), ("errors/attitude", Unit::Degree, attitude)] {
+        let orientation: fn(&[f64; 6]) -> f64 = |six| length(&six[3..]).to_degrees();
+        for (path, unit, error) in [("errors/position", Unit::Metre, position), ("errors/attitude", Unit::Degree, orientation)] {
             let series: Vec<Series> = kinds[..if after { 4 } else { 2 }]
                 .iter()
                 .map(|(name, colour, role, vector)| {

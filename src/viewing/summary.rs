@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 
 use crate::design::outcome::{Advice, DesignOutcome, SearchStep, StopReason, SwarmIteration};
+use crate::event::Start;
 use crate::identification::outcome::{Errors, Identification};
 use crate::measurement::{Measurement, Role};
 use crate::quality::Indexes;
-use crate::recording::event::Start;
 use crate::report::criterion::Words;
 
 /// What is known of the run so far, newest section first.

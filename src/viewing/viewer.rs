@@ -11,8 +11,9 @@ use rerun::sink::{FileSink, GrpcSink, LogSink};
 use super::picture::Picture;
 use super::target::Target;
 use crate::arm::Arm;
-use crate::recording::event::{Event, Listener, ListenerError};
-use crate::scene::DesignProblem;
+use crate::design::problem::DesignProblem;
+use crate::event::Event;
+use crate::progress::{Progress, Stopped};
 
 /// How long a viewer is looked for where nobody asked for one.
 const PROBE: Duration = Duration::from_millis(100);
@@ -36,7 +37,7 @@ pub enum ViewerError {
         /// Why it is none.
         reason: String,
     },
-    /// Nobody listens where a viewer was expected.
+    /// Silent listens where a viewer was expected.
     #[error("no Rerun viewer listens at {url} ({reason}); start one with `rerun`, or ask for `spawn`")]
     Absent {
         /// The address tried.
@@ -250,7 +251,7 @@ impl Viewer {
             .name("viewer".to_owned())
             .spawn(move || {
                 let outcome = show(picture, sink, &queue, &to);
-                // Nobody is left to hear it if the run has ended without waiting.
+                // Silent is left to hear it if the run has ended without waiting.
                 drop(queue);
                 done.send(outcome).ok();
             })
@@ -313,16 +314,16 @@ impl Viewer {
     }
 }
 
-impl Listener for Viewer {
+impl Progress<&Event> for Viewer {
     /// Never an error for a viewer that has gone: closing its window ends no run. A file that cannot be drawn into is one.
-    fn take(&mut self, event: &Event) -> Result<(), ListenerError> {
+    fn report(&mut self, event: &Event) -> Result<(), Stopped> {
         self.send(event.clone());
         if self.lost && matches!(self.destination, Destination::File(_)) {
             let reason = match self.result.try_recv() {
                 Ok(Err(error)) => error.to_string(),
                 _ => self.destination.failed("it stopped taking events".to_owned()).to_string(),
             };
-            return Err(ListenerError(reason));
+            return Err(Stopped(reason));
         }
         Ok(())
     }

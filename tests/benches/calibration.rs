@@ -1,19 +1,20 @@
 //! What the speed marks are about: the comprehensive index, the swarm, and an identification.
 
 use divan::{Bencher, black_box};
-use kincal::cell::measure;
-use kincal::cell::plan::plan;
+use kincal::arm::self_collision::{self, CollisionCheck};
 use kincal::design::candidates::{Rules, Sampler};
 use kincal::design::objective::{Models, Objective};
-use kincal::design::search::{Task, Told, split};
+use kincal::design::problem::Criterion;
+use kincal::design::search::{SearchReport, Task, split};
 use kincal::design::swarm;
 use kincal::identification::identify;
 use kincal::measurement::Measurement;
+use kincal::progress::Silent;
 use kincal::quality::evaluator::{Evaluator, Scratch};
-use kincal::recording::event::Nobody;
-use kincal::scene::{Criterion, SceneFile};
+use kincal::scene::SceneFile;
 use kincal::seed::stream;
-use kincal::self_collision::{self, CollisionCheck};
+use kincal::simulation::cell::measure;
+use kincal::simulation::cell::plan::plan;
 
 fn main() {
     divan::main();
@@ -59,12 +60,13 @@ fn collision_checks(bencher: Bencher) {
 fn swarm(bencher: Bencher, name: &str) {
     let file = scene(name);
     let scene = &file.scene;
-    let models = Models::new(scene).expect("free configurations");
+    let models = Models::new(&scene.request()).expect("free configurations");
     let objective = Objective::new(&models, Criterion::Comprehensive, scene.arm.joint_count());
     let rules = Rules::measurable(&scene.arm, &scene.sensor);
     bencher.bench_local(|| {
         let task = Task::new(&rules, &objective, 40, scene.design.swarm.evaluations(), 1);
-        swarm::search(&task, &scene.design.swarm, &mut stream(1, "bench/swarm"), &mut |_: Told| Ok(())).map(|found| found.value)
+        swarm::search(&task, &scene.design.swarm, &mut stream(1, "bench/swarm"), &mut |_: SearchReport| Ok(()))
+            .map(|found| found.value)
     });
 }
 
@@ -88,7 +90,7 @@ fn measurements(file: &SceneFile, count: usize) -> Vec<Measurement> {
     let rules = Rules::reachable(&file.scene.arm);
     let mut sampler = Sampler::new(&rules);
     let chosen = sampler.draw(&mut stream(1, "bench/poses"), count).expect("free configurations");
-    let planned = plan(&file.scene, &split(&chosen, 8), &[]);
+    let planned = plan(&file.scene.cell(), &split(&chosen, 8), &[]);
     let injected = file.injected.as_ref().expect("a scene to simulate");
-    measure(&file.scene, injected, &planned, planned.len(), &mut Nobody).expect("measurements").0
+    measure(&file.scene.cell(), injected, &planned, planned.len(), &mut Silent).expect("measurements").0
 }

@@ -30,10 +30,10 @@ fn approximate_l(bencher: Bencher, count: usize) {
 }
 
 /// DETMAX for 40 of a pool of 1000, from random members to a set that no excursion makes better. Mark: 0.1 s on two cores.
-#[divan::bench(args = [scene::Criterion::DOptimality, scene::Criterion::IOptimality], sample_count = 20)]
-fn detmax_40_of_1000(bencher: Bencher, criterion: scene::Criterion) {
+#[divan::bench(args = [kincal::design::problem::Criterion::DOptimality, kincal::design::problem::Criterion::IOptimality], sample_count = 20)]
+fn detmax_40_of_1000(bencher: Bencher, criterion: kincal::design::problem::Criterion) {
     let SceneFile { scene, .. } = paper();
-    let models = Models::new(&scene).expect("free configurations");
+    let models = Models::new(&scene.request()).expect("free configurations");
     let rules = Rules::measurable(&scene.arm, &scene.sensor);
     let objective = Objective::new(&models, criterion, scene.arm.joint_count());
     let pool = Sampler::new(&rules).draw(&mut stream(1, "bench/pool"), 1000).expect("free configurations");
@@ -47,9 +47,9 @@ fn detmax_40_of_1000(bencher: Bencher, criterion: scene::Criterion) {
 #[divan::bench(sample_count = 5)]
 fn bound_of_all_configurations(bencher: Bencher) {
     let SceneFile { scene, .. } = paper();
-    let models = Models::new(&scene).expect("free configurations");
+    let models = Models::new(&scene.request()).expect("free configurations");
     let rules = Rules::measurable(&scene.arm, &scene.sensor);
-    bencher.bench_local(|| bound(&models, &rules, scene::Criterion::IOptimality, 1000));
+    bencher.bench_local(|| bound(&models, &rules, kincal::design::problem::Criterion::IOptimality, 1000));
 }
 
 fn paper() -> SceneFile {

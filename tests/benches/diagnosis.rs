@@ -3,8 +3,8 @@
 use divan::{Bencher, black_box};
 use kincal::diagnosis::outcome::NoiseSource;
 use kincal::diagnosis::{Options, Singles, diagnose};
-use kincal::experiments::arms::arm8;
-use kincal::experiments::challenge::{self, case};
+use kincal::lab::challenge::{self, case};
+use kincal::lab::reproduce::arms::arm8;
 use kincal::measurement::Measurement;
 use kincal::scene::Scene;
 

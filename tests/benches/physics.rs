@@ -1,12 +1,12 @@
 //! Settled measurements per second: eight joints, clearance in none, one or all of them; and one effect of each family.
 
 use divan::{Bencher, counter::ItemsCount};
+use kincal::arm::mdh::{Frame, chain};
 use kincal::arm::{Arm, Inertial, Link};
-use kincal::kinematics::mdh::{Frame, chain};
-use kincal::kinematics::{Joint, JointKind};
-use kincal::physics::{Conditions, PhysicalArm, Settling, Start, Stop};
-use kincal::scene::effect::{Effect, Moves};
+use kincal::arm::{Joint, JointKind};
 use kincal::seed::stream;
+use kincal::simulation::effect::{Effect, Moves};
+use kincal::simulation::physics::{Conditions, PhysicalArm, Settling, Start, Stop};
 use nalgebra::{Matrix3, Point3, Vector3};
 
 fn main() {

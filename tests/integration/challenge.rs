@@ -4,11 +4,11 @@ use std::fs;
 use std::path::Path;
 
 use kincal::effects::Kind;
-use kincal::experiments::arms::arm8;
-use kincal::experiments::challenge::verdict::oracle;
-use kincal::experiments::challenge::{Folder, Options, case};
-use kincal::experiments::injection::Sort;
-use kincal::scene::effect::Effect;
+use kincal::lab::challenge::verdict::oracle;
+use kincal::lab::challenge::{Folder, Options, case};
+use kincal::lab::injection::Sort;
+use kincal::lab::reproduce::arms::arm8;
+use kincal::simulation::effect::Effect;
 use serde_json::Value;
 
 use crate::harness::{Ran, kincal, messages, names, number};

@@ -45,7 +45,7 @@ fn ur5_grid_predicts_random_poses() {
 fn ur10_series_with_the_nominal_robot() {
     let Some(data) = data() else { return };
     for (table, nominal_mm) in [("series_b", 1.085), ("series_d", 0.772)] {
-        // The reference fits base and target to positions alone; so does this where attitudes weigh nothing.
+        // The reference fits base and target to positions alone; so does this where orientations weigh nothing.
         let table = format!("ur10_tracker/{table}.csv");
         let json = identify(&data, "ur10_tracker/ur10.urdf", &table, &["--attitude-noise-deg", "10"]);
         near(&json, "/nominal/position_m/rms", nominal_mm, 1e-3);

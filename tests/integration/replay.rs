@@ -37,7 +37,7 @@ fn a_recording_without_a_diagnosis_replays() {
 /// Whatever chooses, the number of threads changes no byte, every step is recorded, and the recording replays.
 #[test]
 fn every_method_is_recorded_and_replays_bit_for_bit() {
-    for method in kincal::scene::Method::ALL.map(kincal::scene::Method::name) {
+    for method in kincal::design::problem::Method::ALL.map(kincal::design::problem::Method::name) {
         let assignment = format!("design.method={method}");
         let set = [&assignment, "design.budget=300", "design.pool=60", "design.count=8", "plan.held_out_count=5"];
         let set: Vec<&str> = set.into_iter().flat_map(|assignment| ["--set", assignment]).collect();

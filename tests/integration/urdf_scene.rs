@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use kincal::kinematics::urdf;
+use kincal::arm::urdf;
 
 use crate::harness::{Ran, kincal, names, number};
 

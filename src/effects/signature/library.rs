@@ -3,9 +3,8 @@
 use super::posture::Mechanism;
 use super::shape::{Course, FORGETTING_S, MAP_ORDERS, MEMORIES, Shape};
 use crate::effects::{Kind, Level, Location};
+use crate::units::ARCSEC;
 
-/// One second of arc, rad.
-const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 /// Periods per turn (2 N) of the ratios N in which strain-wave gears are sold: 30, 50, 80, 100, 120, 160.
 pub const WAVES_PER_TURN: [u16; 6] = [60, 100, 160, 200, 240, 320];
 /// Periods per turn of which a ripple is looked for.
@@ -49,8 +48,8 @@ pub struct Columns {
     pub approach: bool,
     /// Temperatures.
     pub temperature: bool,
-    /// Attitudes.
-    pub attitude: bool,
+    /// Orientations.
+    pub orientation: bool,
     /// Rows are in the order of time.
     pub time: bool,
     /// Rows in time.
@@ -162,7 +161,7 @@ pub fn library(mechanism: &Mechanism, columns: &Columns) -> Vec<Hypothesis> {
     if columns.time {
         all.push(Hypothesis { spread: twist.clone(), ..simple(Kind::BaseDrift, None, Shape::BaseDrift, [15e-6, 80e-6]) });
     }
-    let tool = if columns.attitude { twist.clone() } else { vec![third; 3] };
+    let tool = if columns.orientation { twist.clone() } else { vec![third; 3] };
     if columns.time {
         courses(&twist, &tool, &mut all);
     }

@@ -3,13 +3,13 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::arm::Arm;
-use crate::frames::Pose;
-use crate::kinematics::JointKind;
+use crate::arm::JointKind;
+use crate::arm::frames::Pose;
 
 /// What an arm is made of, as far as signatures need it.
 #[derive(Clone, Debug)]
 pub struct Mechanism {
-    /// Transforms between joints ([`crate::kinematics::ChainAt::segments`]).
+    /// Transforms between joints ([`crate::arm::ChainAt::segments`]).
     pub segments: Vec<Pose>,
     /// Which joints slide.
     pub slides: Vec<bool>,

@@ -75,13 +75,13 @@ pub enum Shape {
     RootAcross(usize),
     /// \[6\] A twist of the base over a course of time.
     BaseCourse(Course),
-    /// \[3, 6 with attitudes\] A twist of the tool over a course of time.
+    /// \[3, 6 with orientations\] A twist of the tool over a course of time.
     ToolCourse(Course),
     /// \[6\] A twist of the base in proportion to time.
     BaseDrift,
     /// \[6\] A twist of the base from a row on.
     BaseStep(usize),
-    /// \[3, 6 with attitudes\] A twist of the tool from a row on.
+    /// \[3, 6 with orientations\] A twist of the tool from a row on.
     ToolStep(usize),
     /// \[1\] Positions in proportion to themselves.
     Scale,
@@ -222,9 +222,9 @@ impl Reading {
 }
 
 impl Shape {
-    /// The columns at `reading`. `attitude`: whether attitudes are measured.
+    /// The columns at `reading`. `orientation`: whether orientations are measured.
     #[must_use]
-    pub fn columns(&self, reading: &Reading, attitude: bool) -> Vec<Displacement> {
+    pub fn columns(&self, reading: &Reading, orientation: bool) -> Vec<Displacement> {
         let posture = &reading.posture;
         match *self {
             Shape::Torque(joint) => vec![reading.moved(joint, reading.effort(joint))],
@@ -256,7 +256,7 @@ impl Shape {
                 vec![reading.moved(joint, cosine), reading.moved(joint, sine)]
             }
             Shape::TwoHarmonics(joint) => {
-                [1.0, 2.0].iter().flat_map(|order| Shape::Harmonic(joint, *order).columns(reading, attitude)).collect()
+                [1.0, 2.0].iter().flat_map(|order| Shape::Harmonic(joint, *order).columns(reading, orientation)).collect()
             }
             Shape::Ratio { joint, source } => vec![reading.moved(joint, reading.joints[source])],
             Shape::Growth(link) => {
@@ -272,7 +272,7 @@ impl Shape {
             Shape::GrowthOnFoot { grows } => {
                 let foot = if grows { reading.rise_k[0] } else { 0.0 };
                 let change = posture.origins[0] * (foot - reading.foot_rise_k);
-                let mut column = Shape::Growth(None).columns(reading, attitude)[0];
+                let mut column = Shape::Growth(None).columns(reading, orientation)[0];
                 for (value, change) in column.iter_mut().zip(change.iter()) {
                     *value += change;
                 }
@@ -314,10 +314,10 @@ impl Shape {
                 vec![reading.turned(joint, moment / libm::sqrt(moment.norm().max(1e-9)))]
             }
             Shape::BaseCourse(course) => base_twist(reading, course.at(reading.share)),
-            Shape::ToolCourse(course) => tool_twist(reading, course.at(reading.share), attitude),
+            Shape::ToolCourse(course) => tool_twist(reading, course.at(reading.share), orientation),
             Shape::BaseDrift => base_twist(reading, reading.share),
             Shape::BaseStep(row) => base_twist(reading, f64::from(u8::from(reading.order >= row))),
-            Shape::ToolStep(row) => tool_twist(reading, f64::from(u8::from(reading.order >= row)), attitude),
+            Shape::ToolStep(row) => tool_twist(reading, f64::from(u8::from(reading.order >= row)), orientation),
             Shape::Scale => vec![twist(reading.target, Vector3::zeros())],
             Shape::Bump { joint, centre, half_width } => {
                 let distance = (reading.joints[joint] - centre).abs() / half_width;
@@ -413,7 +413,7 @@ impl Shape {
 
     /// Number of columns.
     #[must_use]
-    pub fn width(&self, attitude: bool) -> usize {
+    pub fn width(&self, orientation: bool) -> usize {
         match self {
             Shape::Harmonic(..)
             | Shape::Crosstalk { .. }
@@ -429,7 +429,7 @@ impl Shape {
             Shape::AngleMap { .. } => MAP_ORDERS,
             Shape::BaseDrift | Shape::BaseStep(_) | Shape::BaseCourse(_) => 6,
             Shape::ToolStep(_) | Shape::ToolCourse(_) => {
-                if attitude {
+                if orientation {
                     6
                 } else {
                     3
@@ -474,11 +474,11 @@ fn base_twist(reading: &Reading, factor: f64) -> Vec<Displacement> {
     [shifts, turns].concat()
 }
 
-fn tool_twist(reading: &Reading, factor: f64, attitude: bool) -> Vec<Displacement> {
+fn tool_twist(reading: &Reading, factor: f64, orientation: bool) -> Vec<Displacement> {
     let lever = reading.target - reading.posture.tool;
     let axes = [0, 1, 2].map(|axis| Vector3::from(reading.posture.tool_axes.column(axis)) * factor);
     let mut columns = axes.map(|axis| twist(axis, Vector3::zeros())).to_vec();
-    if attitude {
+    if orientation {
         columns.extend(axes.map(|axis| twist(axis.cross(&lever), axis)));
     }
     columns

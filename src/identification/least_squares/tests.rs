@@ -1,5 +1,5 @@
 use super::*;
-use crate::frames::rotation_from_vector;
+use crate::arm::frames::rotation_from_vector;
 use crate::measurement::Role;
 use crate::scene::SceneFile;
 use crate::seed::{Stream, stream};
@@ -15,7 +15,7 @@ fn true_values(arm: &Arm, length: f64, angle: f64, stream: &mut Stream) -> Vec<f
     parameters.map(|p| p.nominal + width(p.quantity.unit()) * stream.uniform(-1.0, 1.0)).collect()
 }
 
-fn measure(arm: &Arm, values: &[f64], count: usize, sigma: [f64; 2], attitude: bool, stream: &mut Stream) -> Vec<Measurement> {
+fn measure(arm: &Arm, values: &[f64], count: usize, sigma: [f64; 2], orientation: bool, stream: &mut Stream) -> Vec<Measurement> {
     let chain = arm.chain.at(values);
     (0..count)
         .map(|index| {
@@ -31,19 +31,19 @@ fn measure(arm: &Arm, values: &[f64], count: usize, sigma: [f64; 2], attitude: b
                 joints,
                 temperatures_c: Vec::new(),
                 position_m: position.into(),
-                attitude_xyzw: attitude.then_some([q.i, q.j, q.k, q.w]),
+                orientation_xyzw: orientation.then_some([q.i, q.j, q.k, q.w]),
                 ..Measurement::default()
             }
         })
         .collect()
 }
 
-fn sensor(sigma: [f64; 2], attitude: bool) -> Sensor {
+fn sensor(sigma: [f64; 2], orientation: bool) -> Sensor {
     Sensor {
         position_in_base: nalgebra::Point3::origin(),
         position_sigma_m: sigma[0],
         position_sigma_per_m: 0.0,
-        attitude_sigma_rad: attitude.then_some(sigma[1]),
+        orientation_sigma_rad: orientation.then_some(sigma[1]),
         temperature_sigma_k: None,
         view: None,
     }
@@ -53,13 +53,13 @@ fn sensor(sigma: [f64; 2], attitude: bool) -> Sensor {
 fn exact_poses_of_any_true_arm_are_predicted_exactly_whatever_was_dropped() {
     let arm = scene("paper.toml").scene.arm;
     let mut stream = stream(1, "test/exact");
-    for attitude in [true, false] {
+    for orientation in [true, false] {
         for _ in 0..5 {
             let values = true_values(&arm, 0.03, 1.72f64.to_radians(), &mut stream);
-            let measured = measure(&arm, &values, 60, [0.0, 0.0], attitude, &mut stream);
-            let result = identify(&arm, &sensor([1e-5, 1e-5], attitude), Weights::Noise, &measured).unwrap();
+            let measured = measure(&arm, &values, 60, [0.0, 0.0], orientation, &mut stream);
+            let result = identify(&arm, &sensor([1e-5, 1e-5], orientation), Weights::Noise, &measured).unwrap();
             assert!(result.converged, "{}", result.reason);
-            assert_eq!(result.rank, if attitude { 36 } else { 33 });
+            assert_eq!(result.rank, if orientation { 36 } else { 33 });
             let held_out = result.held_out.unwrap();
             assert!(held_out.position_m.max < 1e-11, "{:e}", held_out.position_m.max);
             if let Some(rotation) = held_out.rotation_rad {
@@ -85,8 +85,8 @@ fn intervals_cover_the_true_combinations() {
             let exact = measure(&arm, &values, 60, [0.0, 0.0], true, &mut stream);
             let mut noisy = exact.clone();
             for row in &mut noisy {
-                let q = rotation_from_vector(&Vector3::from_fn(|_, _| sigma[1] * stream.normal())) * row.attitude().unwrap();
-                row.attitude_xyzw = Some([q.i, q.j, q.k, q.w]);
+                let q = rotation_from_vector(&Vector3::from_fn(|_, _| sigma[1] * stream.normal())) * row.orientation().unwrap();
+                row.orientation_xyzw = Some([q.i, q.j, q.k, q.w]);
                 row.position_m.iter_mut().for_each(|value| *value += sigma[0] * stream.normal());
             }
             let sensor = sensor(sigma, true);
@@ -142,9 +142,9 @@ fn standard_errors_are_the_scatter_of_the_estimates_with_either_weights() {
         for _ in 0..80 {
             let mut measured = template.clone();
             for row in &mut measured {
-                let attitude = row.attitude().unwrap();
-                let q = rotation_from_vector(&Vector3::from_fn(|_, _| sigma[1] * draw.normal())) * attitude;
-                row.attitude_xyzw = Some([q.i, q.j, q.k, q.w]);
+                let orientation = row.orientation().unwrap();
+                let q = rotation_from_vector(&Vector3::from_fn(|_, _| sigma[1] * draw.normal())) * orientation;
+                row.orientation_xyzw = Some([q.i, q.j, q.k, q.w]);
                 row.position_m.iter_mut().for_each(|value| *value += sigma[0] * draw.normal());
             }
             let result = identify(&arm, &sensor(sigma, true), weights, &measured).unwrap();
@@ -171,7 +171,7 @@ fn too_little_or_unfit_data_is_refused() {
     let refused = identify(&arm, &sensor([1e-5, 1e-5], true), Weights::Noise, &measured).expect_err("30 equations");
     assert_eq!(refused, IdentificationError::TooFew { poses: 5, equations: 30, rank: 36, needed: 6 });
     let refused = identify(&arm, &sensor([1e-5, 0.0], true), Weights::Noise, &measured).unwrap_err();
-    assert_eq!(refused, IdentificationError::NoNoise { what: "attitude" });
+    assert_eq!(refused, IdentificationError::NoNoise { what: "orientation" });
     let mut short = measured.clone();
     short[3].joints.pop();
     let refused = identify(&arm, &sensor([1e-5, 1e-5], true), Weights::Noise, &short).unwrap_err();

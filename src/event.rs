@@ -1,0 +1,71 @@
+//! What happens in a run, in order. Live views, the recording and its replay all see this one type, and
+//! nothing that computes knows of them: steps report what they do ([`Progress`]), the session tells it as events.
+
+use crate::design::outcome::{DesignOutcome, SearchStep, SwarmIteration};
+use crate::diagnosis::outcome::Diagnosis;
+use crate::identification::outcome::Identification;
+use crate::measurement::Measurement;
+use crate::progress::Progress;
+
+/// One event of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// First in every recording.
+    Start(Start),
+    /// An iteration of the swarm.
+    Swarm(SwarmIteration),
+    /// A step of a search by any other method.
+    Search(SearchStep),
+    /// The configurations have been chosen.
+    Designed(DesignOutcome),
+    /// A configuration has been measured.
+    Measured(Measurement),
+    /// The parameters have been identified.
+    Identified(Identification),
+    /// What causes the rest has been looked for in all readings.
+    Diagnosed(Box<Diagnosis>),
+    /// Something worth telling.
+    Note(String),
+}
+
+/// What a recording begins with.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Start {
+    /// Version of kincal.
+    pub version: String,
+    /// The command whose run this is: `run`, `design`, `measure`, `identify`.
+    pub command: String,
+    /// Public part of the scene, as TOML: whatever is needed to repeat the run but the truth. Empty where a real arm was measured and
+    /// its URDF is all there is.
+    pub scene: String,
+    /// Number of poses to be measured, where the scene alone does not tell (a design from elsewhere).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub poses: Option<usize>,
+    /// The real cell, where measurements come from a table.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub real: Option<RealCell>,
+}
+
+/// What is known of a real cell besides its measurements.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct RealCell {
+    /// Nominal robot as URDF; absent where it is the scene's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub urdf: Option<String>,
+    /// Link of the URDF at which the arm begins, if not its root.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base_link: Option<String>,
+    /// Link of the URDF that carries the target, if not its only leaf.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tip_link: Option<String>,
+    /// Declared position noise, one sigma per axis, m.
+    pub position_sigma_m: f64,
+    /// Declared orientation noise, one sigma per axis, rad; unused where only positions were measured.
+    #[serde(rename = "attitude_sigma_rad")]
+    pub orientation_sigma_rad: f64,
+}
+
+/// Whoever listens to a run: takes its events in order.
+pub trait Listener: for<'e> Progress<&'e Event> {}
+
+impl<L: for<'e> Progress<&'e Event> + ?Sized> Listener for L {}

@@ -1,0 +1,52 @@
+//! What `kincal reproduce` repeats: every table and figure of Chen et al. 2019, and what goes beyond them.
+//!
+//! One file per experiment; each returns [`findings::Findings`]: the paper's numbers beside ours.
+
+pub mod advice;
+pub mod arms;
+pub mod bake_off;
+pub mod bench;
+pub mod count_error;
+pub mod count_index;
+pub mod findings;
+pub mod globality;
+pub mod headline;
+pub mod limits;
+pub mod optimise;
+mod pictures;
+pub mod published;
+pub mod quality;
+pub mod sets;
+pub mod situation;
+
+use crate::session::SessionError;
+use bench::Bench;
+use findings::Findings;
+
+/// An experiment by its name.
+pub struct Experiment {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// What it repeats.
+    pub place: &'static str,
+    /// In a few words.
+    pub about: &'static str,
+    /// Trials if nobody asks for another number: the paper's, or enough for a decent interval.
+    pub trials: usize,
+    /// Makes as many trials.
+    pub run: fn(&Bench<'_>, usize) -> Result<Findings, SessionError>,
+}
+
+/// Experiments that go beyond the paper: each is asked for by its name.
+pub const BEYOND: &[Experiment] = &[bake_off::EXPERIMENT, advice::EXPERIMENT];
+
+/// The paper's experiments in its order.
+pub const ALL: &[Experiment] = &[
+    globality::EXPERIMENT,
+    quality::EXPERIMENT,
+    count_index::EXPERIMENT,
+    count_error::EXPERIMENT,
+    optimise::EXPERIMENT,
+    sets::EXPERIMENT,
+    headline::EXPERIMENT,
+];

@@ -1,0 +1,96 @@
+//! The analyser's signatures against what physics makes of the same effect: they are derived apart, and must agree.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::challenge::{Options, case};
+use super::detectability::{difference, has_signal, noiseless};
+use super::injection::Sort;
+use crate::diagnosis::conditions::conditions;
+use crate::diagnosis::rows::{Readings, fit};
+use crate::effects::Kind;
+use crate::effects::signature::library::library;
+use crate::effects::signature::posture::Mechanism;
+use crate::lab::reproduce::arms::arm8;
+use crate::seed::stream;
+use crate::simulation::injected::{Injected, Noise};
+
+/// Share of a displacement that its signature may miss, and where it is more, why.
+fn allowed(kind: Kind) -> f64 {
+    match kind {
+        // A deflected arm bends its own torques.
+        Kind::JointCompliance | Kind::LinkBending => 0.01,
+        // Rows in which the load that seats is as small as it is unknown, or near to what friction holds, count less.
+        Kind::GravityLostMotion | Kind::RadialClearance | Kind::TiltClearance => 0.15,
+        // The sensors of temperature are off by some hundredths of a degree.
+        Kind::LinkThermalGrowth | Kind::JointThermalDrift => 0.05,
+        _ => 0.005,
+    }
+}
+
+#[test]
+fn every_signature_is_what_physics_makes() {
+    let options = Options::quiet(20e-6, 60, 0);
+    let public = case::public(&arm8().unwrap(), &options, &case::key(5), 0).unwrap();
+    let scene = &public.file.scene;
+    let hidden = case::hidden(&public, &options, &case::key(5), 0).injected;
+    let nothing = Injected { effects: Vec::new(), length_error_m: 0.0, angle_error_rad: 0.0, noise: Noise::Off, ..hidden };
+    let mut wrong = Vec::new();
+    let plain = noiseless(scene, &nothing, &public.planned).unwrap();
+    let (measurements, _) = crate::simulation::cell::measure(
+        &scene.cell(),
+        &nothing,
+        &public.planned,
+        public.planned.len(),
+        &mut crate::progress::Silent,
+    )
+    .unwrap();
+    let rows: Vec<_> = measurements.iter().collect();
+    let fitted = fit(
+        &scene.arm,
+        Readings { sensor: &scene.sensor, measurements: &rows, weights: &vec![1.0; rows.len()], displacement: &[], scatter: &[] },
+    )
+    .unwrap();
+    let known = conditions(&rows, &fitted);
+    let library = library(&Mechanism::new(&scene.arm), &known.columns);
+    for kind in Kind::ALL {
+        let sort = Sort::Known(kind);
+        for place in sort.places(&scene.arm) {
+            let magnitude = sort.range(place, &scene.arm)[1];
+            let effect = sort.effect(place, magnitude, &scene.arm, &mut stream(4, kind.name()));
+            if !has_signal(&effect) {
+                continue;
+            }
+            let with = noiseless(scene, &Injected { effects: vec![effect.clone()], ..nothing.clone() }, &public.planned).unwrap();
+            let made = difference(&with, &plain);
+            let moved = DVector::from_iterator(3 * made.len(), made.iter().flat_map(|row| row[..3].to_vec()));
+            let size = moved.norm().max(1e-12);
+            // The best of the variants of this kind at this place.
+            let best = library
+                .iter()
+                .filter(|one| one.kind == Some(kind) && one.location == effect.location())
+                .map(|one| {
+                    let width = one.spread.len();
+                    // Where the base stands is fitted, too.
+                    let mut matrix =
+                        DMatrix::from_fn(moved.len(), width + 3, |row, column| f64::from(u8::from(row % 3 + width == column)));
+                    for (row, reading) in known.readings.iter().enumerate() {
+                        for (column, value) in one.shape.columns(reading, false).iter().enumerate() {
+                            for axis in 0..3 {
+                                matrix[(3 * row + axis, column)] = value[axis];
+                            }
+                        }
+                    }
+                    let solved = matrix.clone().svd(true, true).solve(&moved, 1e-12).unwrap();
+                    (&moved - matrix * &solved).norm() / size
+                })
+                .min_by(f64::total_cmp);
+            let Some(left) = best else {
+                panic!("{kind:?} {place:?} is not in the library");
+            };
+            if left > allowed(kind) && size > 1e-6 {
+                wrong.push(format!("{kind:?} {place:?}: {:.2} % of the displacement is not in the signature", 100.0 * left));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
