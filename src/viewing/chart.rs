@@ -1,6 +1,8 @@
 //! The error of every configuration on a logarithmic scale, which Rerun's plots do not have: drawn in a plane.
 
-use rerun::{LineStrips2D, Points2D, RecordingStream, RecordingStreamResult};
+use re_sdk::{RecordingStream, RecordingStreamResult};
+use re_sdk_types::archetypes::{LineStrips2D, Points2D};
+use re_sdk_types::components::Radius;
 
 const WIDTH: f64 = 160.0;
 const HEIGHT: f64 = 80.0;
@@ -51,7 +53,7 @@ pub(super) fn log_empty(stream: &RecordingStream, path: &str) -> RecordingStream
         .with_labels(["nothing is measured yet"])
         .with_show_labels(true)
         .with_colors([TEXT])
-        .with_radii([rerun::Radius::new_ui_points(0.0)]);
+        .with_radii([Radius::new_ui_points(0.0)]);
     stream.log(format!("{path}/text"), &text)
 }
 
@@ -69,7 +71,7 @@ pub(super) fn log(stream: &RecordingStream, path: &str, unit: Unit, series: &[Se
     let y = |log: f64| (HEIGHT * (f64::from(high) - log) / f64::from(high - low)) as f32;
 
     let lines: Vec<[[f32; 2]; 2]> = (low..=high).map(|e| [[0.0, y(f64::from(e))], [WIDTH as f32, y(f64::from(e))]]).collect();
-    let grid = LineStrips2D::new(lines).with_colors([GRID]).with_radii([rerun::Radius::new_ui_points(0.6)]);
+    let grid = LineStrips2D::new(lines).with_colors([GRID]).with_radii([Radius::new_ui_points(0.6)]);
     stream.log(format!("{path}/grid"), &grid)?;
 
     // A label stands below its point.
@@ -87,12 +89,12 @@ pub(super) fn log(stream: &RecordingStream, path: &str, unit: Unit, series: &[Se
         .with_labels(labels)
         .with_show_labels(true)
         .with_colors(colours)
-        .with_radii([rerun::Radius::new_ui_points(0.0)]);
+        .with_radii([Radius::new_ui_points(0.0)]);
     stream.log(format!("{path}/text"), &text)?;
 
     for one in series {
         let points = one.values.iter().filter(|v| drawable(v.1)).map(|(index, value)| [x(*index), y(libm::log10(*value))]);
-        let points = Points2D::new(points).with_colors([one.colour]).with_radii([rerun::Radius::new_ui_points(2.6)]);
+        let points = Points2D::new(points).with_colors([one.colour]).with_radii([Radius::new_ui_points(2.6)]);
         stream.log(format!("{path}/{}", one.name.replace([' ', ','], "_")), &points)?;
     }
     Ok(())

@@ -103,7 +103,7 @@ fn every_large_dependency_stays_in_its_module() {
         ("parry3d", &["simulation/physics/", "arm/self_collision.rs"]),
         ("mcap", &["recording/"]),
         ("foxglove", &["recording/"]),
-        ("rerun", &["viewing/"]),
+        ("re_sdk", &["viewing/"]),
         ("clap", &["cli/"]),
         ("plotters", &["figure/"]),
     ];
