@@ -2,12 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::DMatrix;
-
-use super::conditions::Conditions;
 use super::evidence::Candidates;
-use super::gram::Surviving;
-use super::rows::Rows;
 use crate::effects::Kind;
 use crate::effects::signature::library::{Hypothesis, RIPPLES};
 use crate::effects::signature::shape::Shape;
@@ -19,32 +14,17 @@ const NAMELESS: f64 = 0.25;
 /// λ at the upper end of the realistic range below which a hypothesis has no information in the data.
 const NO_INFORMATION: f64 = 4.0;
 
-/// `[geometry | signatures | residual]`, m and rad, and the hypotheses that its columns stand for.
-pub(super) fn matrix(rows: &Rows, conditions: &Conditions, hypotheses: Vec<Hypothesis>) -> (DMatrix<f64>, Candidates) {
-    let geometry = rows.jacobian.ncols();
+/// The hypotheses with places for their columns; magnitudes are in units of the middle of what is realistic.
+pub(super) fn candidates(hypotheses: Vec<Hypothesis>) -> Candidates {
     let mut first = Vec::new();
     let mut columns = 0;
     for hypothesis in &hypotheses {
         first.push(columns);
         columns += hypothesis.spread.len();
     }
-    let mut raw = DMatrix::zeros(rows.residual.len(), geometry + columns + 1);
-    raw.columns_mut(0, geometry).copy_from(&rows.jacobian);
-    raw.set_column(geometry + columns, &rows.residual);
-    let unit: Vec<f64> = hypotheses.iter().map(|hypothesis| libm::sqrt(hypothesis.range[0] * hypothesis.range[1])).collect();
-    let orientation = rows.per_row == 6;
-    for (row, reading) in conditions.readings.iter().enumerate() {
-        for (number, hypothesis) in hypotheses.iter().enumerate() {
-            for (at, column) in hypothesis.shape.columns(reading, orientation).iter().enumerate() {
-                let factor = unit[number] * hypothesis.spread[at];
-                for equation in 0..rows.per_row {
-                    raw[(row * rows.per_row + equation, geometry + first[number] + at)] = column[equation] * factor;
-                }
-            }
-        }
-    }
+    let unit = hypotheses.iter().map(|hypothesis| libm::sqrt(hypothesis.range[0] * hypothesis.range[1])).collect();
     let count = hypotheses.len();
-    (raw, Candidates { hypotheses, first, unit, log_odds: vec![0.0; count], active: vec![true; count] })
+    Candidates { hypotheses, first, unit, log_odds: vec![0.0; count], active: vec![true; count] }
 }
 
 /// A class of hypotheses that share one prior.
@@ -73,12 +53,12 @@ fn class(hypothesis: &Hypothesis) -> (Option<Kind>, u8) {
     (hypothesis.kind, shape)
 }
 
-/// Which hypotheses have information, and their prior odds: equal for all kinds, for all places of a kind, for all variants at a
+/// Which hypotheses have information (`information`: of each, the trace of what survives of it), and their prior odds: equal for all kinds, for all places of a kind, for all variants at a
 /// place; shapes without a name share a part.
-pub(super) fn weigh(candidates: &mut Candidates, surviving: &Surviving) {
+pub(super) fn weigh(candidates: &mut Candidates, information: &[f64]) {
     let count = candidates.hypotheses.len();
     for number in 0..count {
-        let information: f64 = candidates.columns(number).map(|column| surviving.products[(column, column)]).sum();
+        let information = information[number];
         let largest = candidates.hypotheses[number].range[1] / candidates.unit[number];
         candidates.active[number] = information * largest * largest >= NO_INFORMATION;
     }

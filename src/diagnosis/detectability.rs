@@ -1,9 +1,10 @@
 //! What these readings could have shown: the smallest magnitude of each kind at each place.
 
 use super::Analysis;
-use super::claims::{Claim, claim, kind_name, place};
+use super::claims::{claim, kind_name, place};
 use super::outcome::{MinimumDetectable, Place, Undetectable};
 use super::power::Bench;
+use super::search::Claim;
 use super::sentence::words;
 use crate::effects::Kind;
 
@@ -20,7 +21,7 @@ pub(super) struct Detectability {
 /// Of all kinds and places. `noise`: mean square over the declared one.
 pub(super) fn detectability(analysis: &Analysis<'_>, noise: f64) -> Detectability {
     use rayon::prelude::*;
-    let candidates = analysis.candidates;
+    let candidates = analysis.evidence.candidates;
     let mut claims: Vec<(Kind, Claim, Vec<usize>)> = Vec::new();
     for number in 0..candidates.hypotheses.len() {
         let this = claim(analysis, number);
@@ -30,7 +31,7 @@ pub(super) fn detectability(analysis: &Analysis<'_>, noise: f64) -> Detectabilit
             (None, None) => {}
         }
     }
-    let bench = Bench::new(candidates, analysis.surviving, analysis.noise, noise, &analysis.found.best.members);
+    let bench = Bench::new(&analysis.evidence, noise, &analysis.found.best);
     let powers: Vec<_> = claims.par_iter().map(|(_, _, variants)| bench.power(variants)).collect();
     let (mut undetectable, mut detectable) = (Vec::new(), Vec::new());
     let (mut seen, mut all) = (0.0, 0.0);
@@ -65,7 +66,7 @@ pub(super) fn detectability(analysis: &Analysis<'_>, noise: f64) -> Detectabilit
         }
     }
     let columns = &analysis.conditions.columns;
-    let joints = analysis.rows.mechanism.joint_count();
+    let joints = analysis.linear.rows.mechanism.joint_count();
     let mut missing = |kind: Kind, reason: &str| {
         for joint in 1..=joints {
             all += 1.0;

@@ -1,9 +1,11 @@
 //! Marginal likelihood of sets of effects, in closed form: linear in the magnitudes, Gaussian priors of physical size, noise level
-//! integrated out, geometry integrated out before (see [`super::gram`]).
+//! integrated out, geometry integrated out before (see [`super::products`]).
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use std::sync::Arc;
 
-use super::gram::Surviving;
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::products::Marginal;
 use crate::effects::Kind;
 use crate::effects::signature::library::Hypothesis;
 use crate::effects::signature::shape::Shape;
@@ -33,6 +35,12 @@ pub struct Candidates {
     pub log_odds: Vec<f64>,
     /// Whether it is in play.
     pub active: Vec<bool>,
+}
+
+/// Logarithm of how much likelier a set of `count` effects is beforehand than their own odds say: any number of effects is as likely as
+/// any other, and so many there are are found in any order.
+fn log_multiplicity(count: usize) -> f64 {
+    (1..=count).map(|number| libm::log(number as f64)).sum()
 }
 
 /// A set of effects, each with the scale of its prior.
@@ -128,8 +136,8 @@ pub fn one_signed(hypothesis: &Hypothesis) -> bool {
     )
 }
 
-/// A model with what is needed to add to it.
-struct Extended {
+/// Members fitted together.
+struct Solved {
     columns: Vec<usize>,
     inverse: DMatrix<f64>,
     coefficients: DVector<f64>,
@@ -137,32 +145,205 @@ struct Extended {
     log_determinant: f64,
 }
 
-fn solve(surviving: &Surviving, candidates: &Candidates, members: &[(usize, usize)]) -> Option<(Extended, Cholesky<f64, Dyn>)> {
-    let mut columns = Vec::new();
-    let mut precision = Vec::new();
-    for (hypothesis, scale) in members {
-        for column in candidates.columns(*hypothesis) {
-            columns.push(column);
-            precision.push(1.0 / (SCALES[*scale].0 * SCALES[*scale].0));
-        }
-    }
-    let count = columns.len();
-    let products = DMatrix::from_fn(count, count, |i, j| {
-        surviving.products[(columns[i], columns[j])] + if i == j { precision[i] } else { 0.0 }
-    });
-    let right = DVector::from_fn(count, |i, _| surviving.with_residual[columns[i]]);
-    let cholesky = Cholesky::new(products)?;
-    let coefficients = cholesky.solve(&right);
-    let drop = right.dot(&coefficients);
-    let log_determinant = (0..count).map(|i| 2.0 * libm::log(cholesky.l_dirty()[(i, i)]) - libm::log(precision[i])).sum::<f64>();
-    Some((Extended { columns, inverse: cholesky.inverse(), coefficients, drop, log_determinant }, cholesky))
+/// The evidence of sets of effects, given what survives of the geometry.
+#[derive(Clone, Copy)]
+pub struct Evidence<'a> {
+    /// What survives of the geometry.
+    pub marginal: &'a Marginal<'a>,
+    /// The hypotheses.
+    pub candidates: &'a Candidates,
+    /// What is known of the noise.
+    pub noise: NoisePrior,
 }
 
-/// Logarithm of the evidence over that of no effect.
-fn log_ratio(surviving: &Surviving, noise: NoisePrior, drop: f64, log_determinant: f64) -> f64 {
-    let before = noise.degrees_of_freedom * noise.level + surviving.residual;
-    let after = (before - drop).max(1e-9 * before);
-    -0.5 * log_determinant - 0.5 * (noise.degrees_of_freedom + surviving.degrees_of_freedom) * libm::log(after / before)
+/// An effect more.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extension {
+    /// The hypothesis and the scale of its prior.
+    pub member: (usize, usize),
+    /// Logarithm of the posterior of the whole set over that of the empty set.
+    pub log_posterior: f64,
+}
+
+impl<'a> Evidence<'a> {
+    fn solve(&self, members: &[(usize, usize)]) -> Option<Solved> {
+        let (mut columns, mut precision) = (Vec::new(), Vec::new());
+        for (hypothesis, scale) in members {
+            for column in self.candidates.columns(*hypothesis) {
+                columns.push(column);
+                precision.push(1.0 / (SCALES[*scale].0 * SCALES[*scale].0));
+            }
+        }
+        let count = columns.len();
+        let mut products = DMatrix::zeros(count, count);
+        for (i, column) in columns.iter().enumerate() {
+            let row = self.marginal.row(*column);
+            for (j, other) in columns.iter().enumerate() {
+                products[(i, j)] = row[*other] + if i == j { precision[i] } else { 0.0 };
+            }
+        }
+        let right = DVector::from_fn(count, |i, _| self.marginal.with_residual[columns[i]]);
+        let cholesky = Cholesky::new(products)?;
+        let coefficients = cholesky.solve(&right);
+        let drop = right.dot(&coefficients);
+        let factor = cholesky.l_dirty();
+        let log_determinant = (0..count).map(|i| 2.0 * libm::log(factor[(i, i)]) - libm::log(precision[i])).sum::<f64>();
+        Some(Solved { columns, inverse: cholesky.inverse(), coefficients, drop, log_determinant })
+    }
+
+    /// Logarithm of the evidence over that of no effect.
+    fn log_ratio(&self, drop: f64, log_determinant: f64) -> f64 {
+        let before = self.noise.degrees_of_freedom * self.noise.level + self.marginal.residual;
+        let after = (before - drop).max(1e-9 * before);
+        let degrees = self.noise.degrees_of_freedom + self.marginal.degrees_of_freedom;
+        -0.5 * log_determinant - 0.5 * degrees * libm::log(after / before)
+    }
+
+    fn level(&self, drop: f64) -> f64 {
+        (self.noise.degrees_of_freedom * self.noise.level + self.marginal.residual - drop).max(1e-12)
+            / (self.noise.degrees_of_freedom + self.marginal.degrees_of_freedom)
+    }
+
+    /// Evidence and prior of `members` together, over those of no effect.
+    #[must_use]
+    pub fn log_posterior(&self, members: &[(usize, usize)]) -> f64 {
+        if members.is_empty() {
+            return 0.0;
+        }
+        let Some(model) = self.solve(members) else {
+            return f64::NEG_INFINITY;
+        };
+        let level = self.level(model.drop);
+        let mut at = 0;
+        let mut total = self.log_ratio(model.drop, model.log_determinant) + log_multiplicity(members.len());
+        for (hypothesis, scale) in members {
+            total += self.candidates.log_odds[*hypothesis] + libm::log(SCALES[*scale].1);
+            if one_signed(&self.candidates.hypotheses[*hypothesis]) {
+                total += log_allowed(model.coefficients[at], libm::sqrt(level * model.inverse[(at, at)]));
+            }
+            at += self.candidates.columns(*hypothesis).len();
+        }
+        total
+    }
+
+    /// Logarithm of the marginal likelihood of the readings with `members`, up to what does not depend on members and on the
+    /// geometry's prior: for the comparison of such priors.
+    #[must_use]
+    pub fn log_likelihood(&self, members: &[(usize, usize)]) -> f64 {
+        let (drop, log_determinant) = self.solve(members).map_or((0.0, 0.0), |model| (model.drop, model.log_determinant));
+        let degrees = self.noise.degrees_of_freedom + self.marginal.degrees_of_freedom;
+        let left = self.noise.degrees_of_freedom * self.noise.level + self.marginal.residual - drop;
+        self.marginal.log_geometry - 0.5 * log_determinant - 0.5 * degrees * libm::log(left.max(1e-12))
+    }
+
+    /// Posterior mean of the noise's mean square beside `members`, in declared sigmas.
+    #[must_use]
+    pub fn noise_level(&self, members: &[(usize, usize)]) -> f64 {
+        self.level(self.solve(members).map_or(0.0, |model| model.drop))
+    }
+
+    /// The coefficients of `members`.
+    #[must_use]
+    pub fn fit(&self, members: &[(usize, usize)]) -> Option<Fit> {
+        let model = self.solve(members)?;
+        Some(Fit {
+            noise: self.level(model.drop),
+            columns: model.columns,
+            coefficients: model.coefficients,
+            covariance: model.inverse,
+            drop: model.drop,
+        })
+    }
+
+    /// Columns and coefficients of `members`.
+    #[must_use]
+    pub fn coefficients(&self, members: &[(usize, usize)]) -> Vec<(usize, f64)> {
+        let fit = self.fit(members);
+        fit.map_or_else(Vec::new, |fit| fit.columns.into_iter().zip(fit.coefficients.iter().copied()).collect())
+    }
+
+    /// All sets that have one effect more than `members`.
+    #[must_use]
+    pub fn extensions(&self, members: &[(usize, usize)]) -> Vec<Extension> {
+        let (marginal, candidates) = (self.marginal, self.candidates);
+        let Some(base) = self.solve(members) else {
+            return Vec::new();
+        };
+        let prior = log_multiplicity(members.len() + 1)
+            + members
+                .iter()
+                .map(|(hypothesis, scale)| candidates.log_odds[*hypothesis] + libm::log(SCALES[*scale].1))
+                .sum::<f64>();
+        let rows: Vec<Arc<Vec<f64>>> = base.columns.iter().map(|column| marginal.row(*column)).collect();
+        let count = rows.len();
+        // Of the columns of one hypothesis: inner products with the members, and what these take of them.
+        let (mut cross, mut taken) = (Vec::new(), Vec::new());
+        let mut found = Vec::with_capacity(SCALES.len() * candidates.hypotheses.len());
+        for hypothesis in 0..candidates.hypotheses.len() {
+            if !candidates.active[hypothesis] || members.iter().any(|(member, _)| candidates.exclude(*member, hypothesis)) {
+                continue;
+            }
+            let columns = candidates.columns(hypothesis);
+            let width = columns.len();
+            cross.clear();
+            taken.clear();
+            for column in columns.clone() {
+                let first = cross.len();
+                cross.extend(rows.iter().map(|row| row[column]));
+                for i in 0..count {
+                    let line = &base.inverse.as_slice()[i * count..(i + 1) * count];
+                    taken.push(line.iter().zip(&cross[first..]).map(|(a, b)| a * b).sum::<f64>());
+                }
+            }
+            let product = |a: usize, b: usize| -> f64 {
+                let (a, b) = (&cross[a * count..(a + 1) * count], &taken[b * count..(b + 1) * count]);
+                a.iter().zip(b).map(|(a, b)| a * b).sum()
+            };
+            let right = |i: usize| -> f64 {
+                let of_members: f64 =
+                    cross[i * count..(i + 1) * count].iter().zip(base.coefficients.iter()).map(|(a, b)| a * b).sum();
+                marginal.with_residual[columns.start + i] - of_members
+            };
+            let signed = one_signed(&candidates.hypotheses[hypothesis]);
+            let mut put = |scale: usize, added: f64, log_determinant: f64, first: f64, variance: f64| {
+                let drop = base.drop + added;
+                let mut total = prior + self.log_ratio(drop, base.log_determinant + log_determinant);
+                total += candidates.log_odds[hypothesis] + libm::log(SCALES[scale].1);
+                if signed {
+                    total += log_allowed(first, libm::sqrt(self.level(drop) * variance));
+                }
+                found.push(Extension { member: (hypothesis, scale), log_posterior: total });
+            };
+            if width == 1 {
+                let (left, right) = (marginal.own(hypothesis, 0, 0) - product(0, 0), right(0));
+                for (scale, (size, _)) in SCALES.iter().enumerate() {
+                    let precision = 1.0 / (size * size);
+                    let diagonal = left + precision;
+                    let coefficient = right / diagonal;
+                    put(scale, right * coefficient, libm::log(diagonal / precision), coefficient, 1.0 / diagonal);
+                }
+                continue;
+            }
+            let left = DMatrix::from_fn(width, width, |i, j| marginal.own(hypothesis, i, j) - product(i, j));
+            let right = DVector::from_fn(width, |i, _| right(i));
+            for (scale, (size, _)) in SCALES.iter().enumerate() {
+                let precision = 1.0 / (size * size);
+                let mut matrix = left.clone();
+                for i in 0..width {
+                    matrix[(i, i)] += precision;
+                }
+                let Some(cholesky) = Cholesky::new(matrix) else {
+                    continue;
+                };
+                let coefficients = cholesky.solve(&right);
+                let factor = cholesky.l_dirty();
+                let log_determinant =
+                    (0..width).map(|i| 2.0 * libm::log(factor[(i, i)])).sum::<f64>() - width as f64 * libm::log(precision);
+                put(scale, right.dot(&coefficients), log_determinant, coefficients[0], 0.0);
+            }
+        }
+        found
+    }
 }
 
 /// Logarithm of the share of the posterior that physics allows, over that of the prior (a half).
@@ -174,119 +355,4 @@ fn log_allowed(mean: f64, sigma: f64) -> f64 {
     } else {
         libm::log(libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2))
     }
-}
-
-/// Evidence and prior of `members` together.
-#[must_use]
-pub fn log_posterior(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior, members: &[(usize, usize)]) -> f64 {
-    if members.is_empty() {
-        return 0.0;
-    }
-    let Some((model, _)) = solve(surviving, candidates, members) else {
-        return f64::NEG_INFINITY;
-    };
-    let level = level(surviving, noise, model.drop);
-    let mut at = 0;
-    let mut total = log_ratio(surviving, noise, model.drop, model.log_determinant);
-    for (hypothesis, scale) in members {
-        total += candidates.log_odds[*hypothesis] + libm::log(SCALES[*scale].1);
-        if one_signed(&candidates.hypotheses[*hypothesis]) {
-            total += log_allowed(model.coefficients[at], libm::sqrt(level * model.inverse[(at, at)]));
-        }
-        at += candidates.columns(*hypothesis).len();
-    }
-    total
-}
-
-fn level(surviving: &Surviving, noise: NoisePrior, drop: f64) -> f64 {
-    (noise.degrees_of_freedom * noise.level + surviving.residual - drop).max(1e-12)
-        / (noise.degrees_of_freedom + surviving.degrees_of_freedom)
-}
-
-/// Posterior mean of the noise's mean square beside `members`, in declared sigmas.
-#[must_use]
-pub fn noise_level(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior, members: &[(usize, usize)]) -> f64 {
-    fit(surviving, candidates, noise, members).map_or_else(|| level(surviving, noise, 0.0), |fit| fit.noise)
-}
-
-/// The coefficients of `members`.
-#[must_use]
-pub fn fit(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior, members: &[(usize, usize)]) -> Option<Fit> {
-    let (model, _) = solve(surviving, candidates, members)?;
-    Some(Fit {
-        noise: level(surviving, noise, model.drop),
-        columns: model.columns,
-        coefficients: model.coefficients,
-        covariance: model.inverse,
-        drop: model.drop,
-    })
-}
-
-/// Coefficients of all signatures, zero for those that are no members.
-#[must_use]
-pub fn coefficients(
-    surviving: &Surviving,
-    candidates: &Candidates,
-    noise: NoisePrior,
-    members: &[(usize, usize)],
-) -> DVector<f64> {
-    let mut coefficients = DVector::zeros(surviving.products.ncols());
-    if let Some(fit) = fit(surviving, candidates, noise, members) {
-        for (column, value) in fit.columns.iter().zip(fit.coefficients.iter()) {
-            coefficients[*column] = *value;
-        }
-    }
-    coefficients
-}
-
-/// All models that have one effect more than `members`.
-#[must_use]
-pub fn extensions(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior, members: &[(usize, usize)]) -> Vec<Model> {
-    let Some((base, _)) = solve(surviving, candidates, members) else {
-        return Vec::new();
-    };
-    let prior: f64 =
-        members.iter().map(|(hypothesis, scale)| candidates.log_odds[*hypothesis] + libm::log(SCALES[*scale].1)).sum();
-    let mut found = Vec::new();
-    for hypothesis in 0..candidates.hypotheses.len() {
-        if !candidates.active[hypothesis] || members.iter().any(|(member, _)| candidates.exclude(*member, hypothesis)) {
-            continue;
-        }
-        let range = candidates.columns(hypothesis);
-        let width = range.len();
-        let cross = DMatrix::from_fn(base.columns.len(), width, |i, j| surviving.products[(base.columns[i], range.start + j)]);
-        let absorbed = &base.inverse * &cross;
-        let left = surviving.products.view((range.start, range.start), (width, width)) - cross.tr_mul(&absorbed);
-        let right = surviving.with_residual.rows(range.start, width) - cross.tr_mul(&base.coefficients);
-        for (scale, (size, share)) in SCALES.iter().enumerate() {
-            let precision = 1.0 / (size * size);
-            let (added, log_determinant, first, variance) = if width == 1 {
-                let diagonal = left[(0, 0)] + precision;
-                let coefficient = right[0] / diagonal;
-                (right[0] * coefficient, libm::log(diagonal / precision), coefficient, 1.0 / diagonal)
-            } else {
-                let mut matrix = left.clone();
-                for i in 0..width {
-                    matrix[(i, i)] += precision;
-                }
-                let Some(cholesky) = Cholesky::new(matrix) else {
-                    continue;
-                };
-                let coefficients = cholesky.solve(&right);
-                let log_determinant =
-                    (0..width).map(|i| 2.0 * libm::log(cholesky.l_dirty()[(i, i)]) - libm::log(precision)).sum::<f64>();
-                (right.dot(&coefficients), log_determinant, coefficients[0], 0.0)
-            };
-            let drop = base.drop + added;
-            let mut total = prior + log_ratio(surviving, noise, drop, base.log_determinant + log_determinant);
-            total += candidates.log_odds[hypothesis] + libm::log(*share);
-            if one_signed(&candidates.hypotheses[hypothesis]) {
-                total += log_allowed(first, libm::sqrt(level(surviving, noise, drop) * variance));
-            }
-            let mut extended = members.to_vec();
-            extended.push((hypothesis, scale));
-            found.push(Model { members: extended, log_posterior: total });
-        }
-    }
-    found
 }

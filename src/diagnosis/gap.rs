@@ -32,7 +32,12 @@ impl<'a> Closing<'a> {
         libm::sqrt(squares / rows)
     }
 
-    /// Held-out RMS with the first `count` effects that each fold uses, m.
+    /// Held-out RMS with what was chosen without each fold, m.
+    pub(super) fn explained(&self) -> f64 {
+        self.rms(self.folds.iter().map(|fold| fold.explained).sum())
+    }
+
+    /// Held-out RMS with the first `count` effects of the best set of all readings, each as large as the other folds say, m.
     pub(super) fn after(&self, count: usize) -> f64 {
         self.rms(self.folds.iter().map(|fold| fold.with(count)).sum())
     }
@@ -51,7 +56,7 @@ impl<'a> Closing<'a> {
             .iter()
             .filter_map(|fold| {
                 let mean = |squares: f64| libm::sqrt(squares / fold.rows as f64);
-                self.closed(mean(fold.geometry), mean(fold.all()))
+                self.closed(mean(fold.geometry), mean(fold.explained))
             })
             .collect();
         let n = of_folds.len() as f64;
@@ -65,9 +70,9 @@ impl<'a> Closing<'a> {
     /// All of it.
     pub(super) fn gap(&self) -> Gap {
         let geometry_rms_m = self.rms(self.folds.iter().map(|fold| fold.geometry).sum());
-        let explained_rms_m = self.after(usize::MAX);
+        let explained_rms_m = self.explained();
         // Where nothing is used nothing is closed.
-        let uses_any = self.folds.iter().any(|fold| !fold.explained.is_empty());
+        let uses_any = self.folds.iter().any(|fold| fold.used > 0);
         let gap_closed = self.closed(geometry_rms_m, explained_rms_m).filter(|_| uses_any);
         Gap {
             nominal_rms_m: self.rms(self.folds.iter().map(|fold| fold.nominal).sum()),
@@ -91,7 +96,7 @@ fn blocked(held_out: &HeldOut) -> Option<Blocked> {
         folds: held_out.folds.len(),
         nominal_rms_m: rms(held_out.folds.iter().map(|fold| fold.nominal).sum()),
         geometry_rms_m: rms(held_out.folds.iter().map(|fold| fold.geometry).sum()),
-        explained_rms_m: rms(held_out.folds.iter().map(Fold::all).sum()),
+        explained_rms_m: rms(held_out.folds.iter().map(|fold| fold.explained).sum()),
         left_out: held_out
             .folds
             .iter()
@@ -101,7 +106,7 @@ fn blocked(held_out: &HeldOut) -> Option<Blocked> {
                     name: fold.name.clone(),
                     readings: fold.rows,
                     geometry_rms_m: rms(fold.geometry),
-                    explained_rms_m: rms(fold.all()),
+                    explained_rms_m: rms(fold.explained),
                 }
             })
             .collect(),

@@ -5,75 +5,16 @@
 //! folds when those were left out. Its own readings were among those that the others' choices were made from; how well they are
 //! predicted does not count.
 
-use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector, Vector3};
+use nalgebra::{DVector, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::FOLDS;
-use super::evidence::{Candidates, NoisePrior, coefficients};
-use super::gram::{Gram, Surviving};
+use super::evidence::{Evidence, NoisePrior};
 use super::groups::Groups;
-use super::rows::Rows;
-use super::search::search;
-use super::whitening::Whitening;
+use super::linear::Linear;
+use super::products::{Marginal, Products};
+use super::search::climb;
 use crate::measurement::Measurement;
-
-/// Rows of the linear problem with what the search needs.
-#[derive(Clone, Debug)]
-pub struct Problem {
-    /// `[geometry | signatures | residual]`, m and rad.
-    pub raw: DMatrix<f64>,
-    /// What makes the equations alike in noise, and weighs the rows.
-    pub whitening: Whitening,
-    /// Equations per row.
-    pub per_row: usize,
-    /// Geometric parameters.
-    pub geometry: usize,
-    /// Fitted geometric parameters over their prior's sigma, zero where free.
-    pub offset: DVector<f64>,
-    /// Which geometric parameters are base and target.
-    pub free: Vec<bool>,
-}
-
-impl Problem {
-    /// The problem of `rows`; `raw` as in [`Problem::raw`].
-    #[must_use]
-    pub fn new(rows: &Rows, raw: DMatrix<f64>) -> Problem {
-        let geometry = rows.jacobian.ncols();
-        let offset = DVector::from_fn(geometry, |column, _| if rows.free[column] { 0.0 } else { rows.parameters[column] });
-        Problem { raw, whitening: rows.whitening.clone(), per_row: rows.per_row, geometry, offset, free: rows.free.clone() }
-    }
-
-    /// The columns of the signatures, m and rad per unit of their coefficients.
-    #[must_use]
-    pub fn signatures(&self) -> DMatrixView<'_, f64> {
-        self.raw.columns(self.geometry, self.raw.ncols() - 1 - self.geometry)
-    }
-
-    /// Inner products fold by fold.
-    #[must_use]
-    pub fn grams(&self, scheme: &Scheme) -> Vec<Gram> {
-        use rayon::prelude::*;
-        (0..scheme.folds)
-            .into_par_iter()
-            .map(|number| {
-                let of_fold: Vec<usize> = (0..scheme.fold.len()).filter(|row| scheme.fold[*row] == number).collect();
-                let gram = Gram::new(&self.whitening.of_rows(&self.raw, &of_fold), self.geometry);
-                // A row that counts half is half an equation.
-                let weight: f64 = of_fold.iter().map(|row| self.whitening.weights()[*row]).sum();
-                Gram { equations: self.per_row as f64 * weight, ..gram }
-            })
-            .collect()
-    }
-
-    /// What geometry and the effects with these coefficients leave, m and rad.
-    #[must_use]
-    pub fn left(&self, surviving: &Surviving, coefficients: &DVector<f64>) -> DVector<f64> {
-        let last = self.raw.ncols() - 1;
-        let signatures = surviving.absorbed.columns(0, last - self.geometry);
-        let change = surviving.absorbed.column(last - self.geometry) - signatures * coefficients;
-        self.raw.column(last) - self.raw.columns(0, self.geometry) * change - self.signatures() * coefficients
-    }
-}
 
 /// What one fold says.
 #[derive(Clone, Debug)]
@@ -86,34 +27,33 @@ pub struct Fold {
     pub nominal: f64,
     /// With all geometry.
     pub geometry: f64,
-    /// With all geometry and the first 1, 2, … effects chosen without the fold, as many as are used; the last stands for more.
-    pub explained: Vec<f64>,
-    /// What evidence chose, in the order added, whether it is used or not.
+    /// With all geometry and the first 1, 2, … effects of the best set of all readings, each as large as the other folds say.
+    pub with_best: Vec<f64>,
+    /// With all geometry and what was chosen without the fold, as much of it as is used.
+    pub explained: f64,
+    /// With the first 1, 2, … of what was chosen without the fold.
+    pub with_chosen: Vec<f64>,
+    /// What was chosen without the fold, in the order added.
     pub chosen: Vec<usize>,
-    /// Sets of hypotheses with their probabilities.
-    pub models: Vec<(Vec<(usize, usize)>, f64)>,
+    /// How many of these are used.
+    pub used: usize,
 }
 
 impl Fold {
-    /// With the first `count` effects of those that are used.
+    /// With the first `count` effects of the best set of all readings.
     #[must_use]
     pub fn with(&self, count: usize) -> f64 {
-        match self.explained.len().min(count) {
+        match self.with_best.len().min(count) {
             0 => self.geometry,
-            count => self.explained[count - 1],
+            count => self.with_best[count - 1],
         }
     }
 
-    /// With all that is used.
-    #[must_use]
-    pub fn all(&self) -> f64 {
-        self.with(usize::MAX)
-    }
-
-    /// Whether something that evidence chose is not used.
-    #[must_use]
-    pub fn does_without(&self) -> bool {
-        self.explained.len() < self.chosen.len()
+    fn with_first_chosen(&self, count: usize) -> f64 {
+        match self.with_chosen.len().min(count) {
+            0 => self.geometry,
+            count => self.with_chosen[count - 1],
+        }
     }
 }
 
@@ -131,7 +71,7 @@ impl HeldOut {
     #[must_use]
     pub fn explained(&self) -> f64 {
         let rows: usize = self.folds.iter().map(|fold| fold.rows).sum();
-        self.folds.iter().map(Fold::all).sum::<f64>() / rows.max(1) as f64
+        self.folds.iter().map(|fold| fold.explained).sum::<f64>() / rows.max(1) as f64
     }
 }
 
@@ -244,142 +184,95 @@ pub fn regions(points: &[Vector3<f64>], folds: usize) -> Vec<usize> {
     fold
 }
 
-/// Leaves out each fold of `scheme` in turn. `good`: rows that are no outliers; only they are counted.
-#[must_use]
-pub fn cross_validate(
-    problem: &Problem,
-    scheme: &Scheme,
-    good: &[bool],
-    grams: &[Gram],
-    candidates: &Candidates,
-    noise: NoisePrior,
-    most: usize,
-) -> HeldOut {
-    use rayon::prelude::*;
-    let total = sum(grams);
-    let mut folds: Vec<Fold> = (0..grams.len())
-        .into_par_iter()
-        .filter(|number| scheme.leaves_enough(*number))
-        .filter_map(|number| {
-            let rows: Vec<usize> = (0..good.len()).filter(|row| scheme.fold[*row] == number && good[*row]).collect();
-            let fold = leave_out(problem, &total.without(&grams[number]), &rows, candidates, noise, most)?;
-            Some(Fold { name: scheme.names[number].clone(), ..fold })
-        })
-        .collect();
-    let used: Vec<usize> = (0..folds.len()).map(|number| used(&folds, number)).collect();
-    for (fold, used) in folds.iter_mut().zip(used) {
-        fold.explained.truncate(used);
+/// What is left out and chosen anew.
+pub struct Validation<'a> {
+    /// The readings.
+    pub linear: &'a Linear<'a>,
+    /// What is known of the noise.
+    pub noise: NoisePrior,
+    /// Rows that are no outliers; only they are counted.
+    pub good: &'a [bool],
+    /// The best set of all readings.
+    pub best: &'a [(usize, usize)],
+    /// Effects of a set at most.
+    pub most: usize,
+}
+
+impl Validation<'_> {
+    /// Leaves out each fold of `scheme` in turn; `products` are by its folds.
+    #[must_use]
+    pub fn run(&self, scheme: &Scheme, products: &Products) -> HeldOut {
+        use rayon::prelude::*;
+        let mut folds: Vec<Fold> = (0..scheme.folds)
+            .into_par_iter()
+            .filter(|number| scheme.leaves_enough(*number))
+            .filter_map(|number| {
+                let rows: Vec<usize> =
+                    (0..self.good.len()).filter(|row| scheme.fold[*row] == number && self.good[*row]).collect();
+                let fold = self.leave_out(products, number, &rows)?;
+                Some(Fold { name: scheme.names[number].clone(), ..fold })
+            })
+            .collect();
+        let used: Vec<usize> = (0..folds.len()).map(|number| used(&folds, number)).collect();
+        for (fold, used) in folds.iter_mut().zip(used) {
+            fold.used = used;
+            fold.explained = fold.with_first_chosen(used);
+        }
+        HeldOut { by: scheme.by, folds }
     }
-    HeldOut { by: scheme.by, folds }
+
+    /// `rows`: those of fold `number` that count.
+    fn leave_out(&self, products: &Products, number: usize, rows: &[usize]) -> Option<Fold> {
+        if rows.is_empty() {
+            return None;
+        }
+        let linear = self.linear;
+        let marginal = Marginal::new(products, Some(number), &linear.prior)?;
+        let evidence = Evidence { marginal: &marginal, candidates: linear.candidates, noise: self.noise };
+        let (chosen, _) = climb(&evidence, &[], self.most);
+        let squares = |members: &[(usize, usize)]| {
+            let coefficients = evidence.coefficients(members);
+            linear.squares(rows, &marginal.geometry(&coefficients), &linear.made(&coefficients))
+        };
+        let first =
+            |members: &[(usize, usize)]| -> Vec<f64> { (1..=members.len()).map(|count| squares(&members[..count])).collect() };
+        let geometry = squares(&[]);
+        Some(Fold {
+            name: String::new(),
+            rows: rows.len(),
+            nominal: self.nominal(&marginal, rows)?,
+            geometry,
+            with_best: first(self.best),
+            explained: geometry,
+            with_chosen: first(&chosen),
+            chosen: chosen.iter().map(|(hypothesis, _)| *hypothesis).collect(),
+            used: 0,
+        })
+    }
+
+    /// Base and target fitted to all other folds; sum of squares of the positions of `rows`.
+    fn nominal(&self, marginal: &Marginal<'_>, rows: &[usize]) -> Option<f64> {
+        let linear = self.linear;
+        let change = marginal.free_only(&linear.prior)?;
+        Some(linear.squares(rows, &change, &DVector::zeros(linear.residual.len())))
+    }
 }
 
 /// How many of the effects chosen for fold `number` are used, by what as many of theirs did to the other folds: the most with which
-/// those were predicted no worse than by geometry alone, or by no more than one standard error, for evidence has the benefit of the
-/// doubt. All of them where fewer than two other folds can tell. Folds are compared, not readings: those of a region err alike.
+/// those were predicted no worse than by geometry alone, in the mean of the logarithms of how much less is left. No fold's gain counts
+/// for more than a factor of e, and no loss for more than e³: one that goes wild outvotes others, and others do not outvote it. All of them where fewer than two other folds can tell.
 pub(super) fn used(folds: &[Fold], number: usize) -> usize {
-    let chosen = folds[number].explained.len();
+    let chosen = folds[number].with_chosen.len();
     let others = || folds.iter().enumerate().filter(|(other, _)| *other != number).map(|(_, fold)| fold);
     let count = others().count() as f64;
     if count < 2.0 {
         return chosen;
     }
     let no_worse = |effects: &usize| {
-        let worse: Vec<f64> = others().map(|fold| fold.with(*effects) - fold.geometry).collect();
-        let mean = worse.iter().sum::<f64>() / count;
-        let scatter: f64 = worse.iter().map(|worse| (worse - mean) * (worse - mean)).sum();
-        mean <= libm::sqrt(scatter / (count * (count - 1.0)))
+        let logs: Vec<f64> = others()
+            .map(|fold| libm::log(fold.with_first_chosen(*effects) / fold.geometry.max(1e-300)).clamp(-1.0, 3.0))
+            .collect();
+        logs.iter().sum::<f64>() <= 0.0
     };
     (1..=chosen).rev().find(no_worse).unwrap_or(0)
-}
-
-/// The sum of all blocks.
-#[must_use]
-pub fn sum(grams: &[Gram]) -> Gram {
-    let mut total = grams[0].clone();
-    for gram in &grams[1..] {
-        total.products += &gram.products;
-        total.equations += gram.equations;
-    }
-    total
-}
-
-/// `train`: inner products of all rows but those of the fold; `rows`: those of the fold that count.
-fn leave_out(
-    problem: &Problem,
-    train: &Gram,
-    rows: &[usize],
-    candidates: &Candidates,
-    noise: NoisePrior,
-    most: usize,
-) -> Option<Fold> {
-    if rows.is_empty() {
-        return None;
-    }
-    let surviving = train.surviving(&problem.offset)?;
-    let found = search(&surviving, candidates, noise, most);
-    let last = problem.raw.ncols() - 1;
-    let squares = |members: &[(usize, usize)]| -> f64 {
-        let coefficients = coefficients(&surviving, candidates, noise, members);
-        // The geometry answers to what the effects leave.
-        let signatures = surviving.absorbed.columns(0, last - problem.geometry);
-        let change = surviving.absorbed.column(last - problem.geometry) - signatures * &coefficients;
-        let mut sum = 0.0;
-        for row in rows {
-            for axis in 0..3 {
-                let equation = problem.raw.row(row * problem.per_row + axis);
-                let geometry: f64 = (0..problem.geometry).map(|column| equation[column] * change[column]).sum();
-                let effects: f64 = members
-                    .iter()
-                    .flat_map(|(hypothesis, _)| candidates.columns(*hypothesis))
-                    .map(|column| equation[problem.geometry + column] * coefficients[column])
-                    .sum();
-                let left = equation[last] - geometry - effects;
-                sum += left * left;
-            }
-        }
-        sum
-    };
-    let geometry = squares(&[]);
-    let mut explained = Vec::new();
-    for count in 1..=found.best.members.len() {
-        explained.push(squares(&found.best.members[..count]));
-    }
-    Some(Fold {
-        name: String::new(),
-        rows: rows.len(),
-        nominal: nominal(problem, train, rows)?,
-        geometry,
-        explained,
-        chosen: found.best.members.iter().map(|(hypothesis, _)| *hypothesis).collect(),
-        models: found.models,
-    })
-}
-
-/// Base and target fitted to all other folds (inner products `train`); sum of squares of the positions of `rows`.
-fn nominal(problem: &Problem, train: &Gram, rows: &[usize]) -> Option<f64> {
-    let free: Vec<usize> = (0..problem.geometry).filter(|column| problem.free[*column]).collect();
-    let last = problem.raw.ncols() - 1;
-    // What the nominal arm leaves: the fitted frames taken back.
-    let back = |equation: usize| -> f64 {
-        let fitted: f64 = (0..problem.geometry).map(|column| problem.raw[(equation, column)] * problem.offset[column]).sum();
-        problem.raw[(equation, last)] + fitted
-    };
-    let count = free.len();
-    // Base and target answer to it with the priors' unit precision, as the joint fit does.
-    let normal = DMatrix::from_fn(count, count, |i, j| train.products[(free[i], free[j])] + f64::from(u8::from(i == j)));
-    let right = DVector::from_fn(count, |i, _| {
-        let fitted: f64 = (0..problem.geometry).map(|column| train.products[(free[i], column)] * problem.offset[column]).sum();
-        train.products[(free[i], last)] + fitted
-    });
-    let change = Cholesky::new(normal)?.solve(&right);
-    let mut sum = 0.0;
-    for row in rows {
-        for axis in 0..3 {
-            let equation = row * problem.per_row + axis;
-            let fitted: f64 = (0..count).map(|at| problem.raw[(equation, free[at])] * change[at]).sum();
-            let left = back(equation) - fitted;
-            sum += left * left;
-        }
-    }
-    Some(sum)
 }

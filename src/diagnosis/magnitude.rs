@@ -3,7 +3,7 @@
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::Analysis;
-use super::evidence::{Fit, SCALES, fit, one_signed};
+use super::evidence::{Fit, SCALES, one_signed};
 use super::outcome::Magnitude;
 use crate::effects::Kind;
 use crate::effects::signature::shape::Shape;
@@ -12,15 +12,15 @@ use crate::effects::signature::shape::Shape;
 /// are told from.
 pub(super) fn unpulled(analysis: &Analysis<'_>) -> Option<Fit> {
     let widest = SCALES.len() - 1;
-    let members: Vec<(usize, usize)> = analysis.found.best.members.iter().map(|(member, _)| (*member, widest)).collect();
-    fit(analysis.surviving, analysis.candidates, analysis.noise, &members)
+    let members: Vec<(usize, usize)> = analysis.found.best.iter().map(|(member, _)| (*member, widest)).collect();
+    analysis.evidence.fit(&members)
 }
 
 /// The magnitude of a member of the best set, from its fit ([`unpulled`]).
 pub(super) fn magnitude(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -> Magnitude {
-    let of = &analysis.candidates.hypotheses[hypothesis];
-    let unit = analysis.candidates.unit[hypothesis];
-    let columns = analysis.candidates.columns(hypothesis);
+    let of = &analysis.evidence.candidates.hypotheses[hypothesis];
+    let unit = analysis.evidence.candidates.unit[hypothesis];
+    let columns = analysis.evidence.candidates.columns(hypothesis);
     // Of a twist, the length of its translation.
     let width = match of.shape {
         Shape::BaseDrift | Shape::BaseStep(_) | Shape::ToolStep(_) => 3,
@@ -30,10 +30,11 @@ pub(super) fn magnitude(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -
     let at: Vec<usize> = columns.take(width).filter_map(|column| fit.columns.iter().position(|known| *known == column)).collect();
     let value = |i: usize| fit.coefficients[at[i]] * unit * of.spread[i];
     let covariance = |i: usize, j: usize| fit.noise * fit.covariance[(at[i], at[j])] * unit * unit * of.spread[i] * of.spread[j];
-    let degrees_of_freedom = (analysis.surviving.degrees_of_freedom + analysis.noise.degrees_of_freedom).max(1.0);
+    let degrees_of_freedom =
+        (analysis.evidence.marginal.degrees_of_freedom + analysis.evidence.noise.degrees_of_freedom).max(1.0);
     let quantile = StudentsT::new(0.0, 1.0, degrees_of_freedom).map_or(1.96, |student| student.inverse_cdf(0.975));
     let name = of.kind.map_or("", Kind::unit).to_owned();
-    let load = matches!(of.kind, Some(Kind::JointCompliance | Kind::LinkBending)) && !analysis.rows.mechanism.masses_known;
+    let load = matches!(of.kind, Some(Kind::JointCompliance | Kind::LinkBending)) && !analysis.linear.rows.mechanism.masses_known;
     let name = if load { "relative (no masses)".to_owned() } else { name };
     let model = model_sigma(of.kind);
     if width == 1 {

@@ -1,8 +1,9 @@
 //! From measurements to causes: what geometry leaves, which effects explain it with what probability, how far that goes on poses
 //! that were not used, what could not have been seen, and what remains unknown.
 //!
-//! Everything is linear about the fitted geometry, so that inner products ([`gram`]) suffice for evidence ([`evidence`]), search
-//! ([`search`]) and cross-validation ([`held_out`]).
+//! Data ([`groups`], [`conditions`]) → a linear problem about the fitted geometry and the effects found so far ([`rows`], [`linear`]), made
+//! again until nothing changes → sets of effects with their probabilities, for which inner products suffice ([`products`], [`evidence`],
+//! [`search`]) → what they are worth on readings that were not used ([`held_out`]) → what is said ([`outcome`]).
 
 mod advice;
 mod candidates;
@@ -12,9 +13,9 @@ mod confusion;
 mod detectability;
 pub mod evidence;
 mod gap;
-pub mod gram;
 pub mod groups;
 pub mod held_out;
+mod linear;
 mod magnitude;
 pub mod mistake;
 mod naming;
@@ -24,6 +25,7 @@ pub mod outcome;
 pub mod outliers;
 mod parameters;
 pub mod power;
+pub mod products;
 mod ripple;
 pub mod rows;
 pub mod scatter;
@@ -37,28 +39,34 @@ pub mod waterfall;
 mod weights;
 pub mod whitening;
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DVector, Vector3};
 
 use crate::arm::Arm;
 use crate::effects::signature::library::{Hypothesis, library, ripple};
 use crate::effects::signature::shape::Displacement;
 use crate::effects::{Kind, Location};
 use crate::measurement::{Measurement, Sensor};
-use candidates::{matrix, weigh};
+use candidates::{candidates, weigh};
 use conditions::Conditions;
-use evidence::{Candidates, NoisePrior};
-use gram::Surviving;
-use groups::Repeats;
-use held_out::{Block, Problem};
+use evidence::{Candidates, Evidence, Extension, NoisePrior};
+use groups::{Groups, Repeats};
+use held_out::{Block, HeldOut, Scheme, Validation};
+use linear::Linear;
 use outcome::{Diagnosis, NoiseSource};
+use products::{Marginal, Products};
 use ripple::Ripple;
 use rows::{DiagnosisError, Readings, Rows};
 use scatter::Scatter;
+use search::{Found, climb};
 
 /// Folds of the cross-validation.
 pub const FOLDS: usize = 5;
 /// Rounds of fitting around what was found.
-const PASSES: usize = 5;
+const PASSES: usize = 8;
+/// Effects of a set at most.
+const MOST: usize = 24;
+/// Sigmas of the geometry's prior over those of manufacturing that are tried: the data say how far the arm is from nominal.
+const GEOMETRY_SCALES: [f64; 5] = [3.0, 1.0, 0.3, 0.1, 0.03];
 /// Times that what was found is looked through for joints that do not repeat.
 const LOOKS: usize = 3;
 /// Degrees of freedom of what repeats without a move tell of the noise.
@@ -99,16 +107,40 @@ impl Options {
     }
 }
 
-/// What a pass of the diagnosis is made around.
+/// The readings, and what is known of them before any model.
+struct Data<'a> {
+    arm: &'a Arm,
+    sensor: &'a Sensor,
+    measurements: &'a [&'a Measurement],
+    options: &'a Options,
+    groups: Groups,
+    repeats: Option<Repeats>,
+    noise: NoisePrior,
+    /// Noise of the orientations beside that of the positions, over what is said of both, where repeats tell it.
+    orientation: Option<f64>,
+}
+
+impl<'a> Data<'a> {
+    fn new(arm: &'a Arm, sensor: &'a Sensor, measurements: &'a [&'a Measurement], options: &'a Options) -> Data<'a> {
+        let groups = groups::groups(measurements);
+        let repeats = groups::repeats(measurements, &groups);
+        let sigma_m = sensor.mean_position_sigma(measurements.iter().copied());
+        let noise = noise_prior(repeats, sigma_m, options.noise);
+        let orientation = weights::orientation_of_repeats(sensor, repeats, sigma_m);
+        Data { arm, sensor, measurements, options, groups, repeats, noise, orientation }
+    }
+}
+
+/// What a pass is made around.
 #[derive(Clone)]
-struct Around {
+struct State {
     /// Weight of each row for being far off.
     far: Vec<f64>,
     /// Weight of each row for being like others of its configuration.
     dependent: Vec<f64>,
     /// What the effects found so far do.
     displacement: Vec<Displacement>,
-    /// The best set so far, sorted.
+    /// The best set so far.
     members: Vec<(usize, usize)>,
     /// Ripples that scans have added to the library.
     ripples: Vec<Ripple>,
@@ -116,43 +148,139 @@ struct Around {
     scatter: Vec<Scatter>,
     /// Noise of the orientations over what is said of it, beside that of the positions.
     orientation: f64,
+    /// Sigma of the geometry's prior over that of manufacturing.
+    scale: f64,
 }
 
-impl Around {
-    /// Nothing found, all of `rows` rows good.
-    fn nominal(rows: usize) -> Around {
-        Around {
+impl State {
+    /// Nothing found, all rows good.
+    fn nominal(data: &Data<'_>) -> State {
+        let rows = data.measurements.len();
+        State {
             far: vec![1.0; rows],
             dependent: vec![1.0; rows],
             displacement: Vec::new(),
             members: Vec::new(),
             ripples: Vec::new(),
             scatter: Vec::new(),
-            orientation: 1.0,
+            orientation: data.orientation.unwrap_or(1.0),
+            scale: 1.0,
         }
     }
 
-    /// Around what a pass found.
-    fn next(self, weighed: weights::Weighed, displacement: Vec<Displacement>, members: Vec<(usize, usize)>) -> Around {
-        Around { far: weighed.far, dependent: weighed.dependent, displacement, members, ..self }
+    fn weights(&self) -> Vec<f64> {
+        self.dependent.iter().zip(&self.far).map(|(a, b)| a * b).collect()
     }
 
-    /// Whether a pass found what it was made around.
-    fn is_settled(&self, weighed: &weights::Weighed, members: &[(usize, usize)]) -> bool {
+    /// Around what `pass` found.
+    fn after(&self, pass: &Pass) -> State {
+        State {
+            far: pass.weighed.far.clone(),
+            dependent: pass.weighed.dependent.clone(),
+            displacement: pass.displacement.clone(),
+            members: pass.members.clone(),
+            scale: pass.scale,
+            ..self.clone()
+        }
+    }
+
+    /// Whether `pass` found what it was made around.
+    fn is_settled(&self, pass: &Pass) -> bool {
         let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-2);
-        same(&weighed.far, &self.far) && same(&weighed.dependent, &self.dependent) && *members == self.members
+        let sorted = |members: &[(usize, usize)]| {
+            let mut sorted = members.to_vec();
+            sorted.sort_unstable();
+            sorted
+        };
+        same(&pass.weighed.far, &self.far)
+            && same(&pass.weighed.dependent, &self.dependent)
+            && sorted(&pass.members) == sorted(&self.members)
+            && pass.scale == self.scale
+    }
+}
+
+/// One round: everything about the arm as it is with the effects found so far.
+struct Pass {
+    rows: Rows,
+    conditions: Conditions,
+    candidates: Candidates,
+    /// Folds by region.
+    scheme: Scheme,
+    products: Products,
+    /// Sigma of the geometry's prior over that of manufacturing.
+    scale: f64,
+    /// The likeliest set.
+    members: Vec<(usize, usize)>,
+    /// What it does to each row.
+    displacement: Vec<Displacement>,
+    /// What it leaves, m and rad.
+    residual: DVector<f64>,
+    weighed: weights::Weighed,
+}
+
+impl Pass {
+    /// `pass`: number of the pass; the geometry's prior is chosen in the first ones.
+    fn new(data: &Data<'_>, state: &State, pass: usize) -> Result<Pass, DiagnosisError> {
+        let weights = state.weights();
+        let (measurements, displacement) = (data.measurements, &state.displacement);
+        let orientation_sigma_rad = data.sensor.orientation_sigma_rad.map(|sigma| sigma * state.orientation);
+        let sensor = &Sensor { orientation_sigma_rad, ..data.sensor.clone() };
+        let readings = Readings { sensor, measurements, weights: &weights, displacement, scatter: &state.scatter };
+        let rows = rows::fit(data.arm, readings)?;
+        let conditions = conditions::conditions(measurements, &rows);
+        let mut candidates = candidates(data.options.hypotheses(&rows, &conditions, &state.ripples));
+        let scheme = held_out::schemes(measurements, &rows.targets, &data.groups).swap_remove(0);
+        let linear = Linear::new(&rows, &conditions.readings, &candidates, displacement, state.scale);
+        let products = linear.products(&scheme.fold, scheme.folds);
+        let prior = linear.prior;
+        let marginal = Marginal::new(&products, None, &prior).ok_or(DiagnosisError::Degenerate)?;
+        let information: Vec<f64> = (0..candidates.hypotheses.len()).map(|number| marginal.information(number)).collect();
+        weigh(&mut candidates, &information);
+        let evidence = Evidence { marginal: &marginal, candidates: &candidates, noise: data.noise };
+        let (mut members, _) = climb(&evidence, &state.members, MOST);
+        let mut scale = state.scale;
+        if pass < 3 {
+            let likelihood = |scale: f64| -> f64 {
+                let other = Marginal::new(&products, None, &prior.scaled(scale));
+                other.map_or(f64::NEG_INFINITY, |other| Evidence { marginal: &other, ..evidence }.log_likelihood(&members))
+            };
+            let best = GEOMETRY_SCALES.map(|scale| (likelihood(scale), scale)).into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+            scale = best.map_or(scale, |(_, scale)| scale);
+        }
+        let again;
+        let marginal = if scale == state.scale {
+            &marginal
+        } else {
+            again = Marginal::new(&products, None, &prior.scaled(scale)).ok_or(DiagnosisError::Degenerate)?;
+            &again
+        };
+        let evidence = Evidence { marginal, candidates: &candidates, noise: data.noise };
+        if scale != state.scale {
+            members = climb(&evidence, &members, MOST).0;
+        }
+        let linear = Linear::new(&rows, &conditions.readings, &candidates, displacement, scale);
+        let coefficients = evidence.coefficients(&members);
+        let made = linear.made(&coefficients);
+        let residual = linear.left(&marginal.geometry(&coefficients), &made);
+        let weighed = weights::weigh(&rows, &residual, &weights, &data.groups);
+        let per_row = rows.per_row;
+        let displacement =
+            made.as_slice().chunks(per_row).map(|row| std::array::from_fn(|at| row.get(at).copied().unwrap_or(0.0))).collect();
+        Ok(Pass { rows, conditions, candidates, scheme, products, scale, members, displacement, residual, weighed })
+    }
+
+    fn linear(&self, state: &State) -> Linear<'_> {
+        Linear::new(&self.rows, &self.conditions.readings, &self.candidates, &state.displacement, self.scale)
     }
 }
 
 /// What was found, before it is put into words.
 pub(crate) struct Analysis<'a> {
-    pub(crate) rows: &'a Rows,
+    pub(crate) linear: &'a Linear<'a>,
     pub(crate) conditions: &'a Conditions,
-    pub(crate) candidates: &'a Candidates,
-    pub(crate) surviving: &'a Surviving,
-    pub(crate) noise: NoisePrior,
-    pub(crate) found: search::Found,
-    pub(crate) held_out: Vec<held_out::HeldOut>,
+    pub(crate) evidence: Evidence<'a>,
+    pub(crate) found: Found,
+    pub(crate) held_out: Vec<HeldOut>,
     pub(crate) structure: open_set::Structure,
     pub(crate) outliers: outliers::Outliers,
     /// Joints that do not repeat.
@@ -188,146 +316,143 @@ pub fn diagnose(
     measurements: &[&Measurement],
     options: &Options,
 ) -> Result<Diagnosis, DiagnosisError> {
-    let total = measurements.len();
-    let groups = groups::groups(measurements);
-    let repeats = groups::repeats(measurements, &groups);
-    let sigma_m = sensor.mean_position_sigma(measurements.iter().copied());
-    let noise = noise_prior(repeats, sigma_m, options.noise);
-    let by_repeats = weights::orientation_of_repeats(sensor, repeats, sigma_m);
-    let mut around = Around { orientation: by_repeats.unwrap_or(1.0), ..Around::nominal(total) };
+    let data = Data::new(arm, sensor, measurements, options);
+    let (state, pass) = settle(&data)?;
+    let linear = pass.linear(&state);
+    let marginal = Marginal::new(&pass.products, None, &linear.prior).ok_or(DiagnosisError::Degenerate)?;
+    let evidence = Evidence { marginal: &marginal, candidates: &pass.candidates, noise: data.noise };
+    let found = search::search(&evidence, &pass.members, MOST);
+    let coefficients = evidence.coefficients(&found.best);
+    let residual = linear.left(&marginal.geometry(&coefficients), &linear.made(&coefficients));
+    let outliers = outliers_of(&data, &pass, &found);
+    let good: Vec<bool> = (0..measurements.len()).map(|row| !outliers.rows.contains(&row)).collect();
+    let validation = Validation { linear: &linear, noise: data.noise, good: &good, best: &found.best, most: MOST };
+    let held_out: Vec<HeldOut> = held_out::schemes(measurements, &pass.rows.targets, &data.groups)
+        .iter()
+        .map(|scheme| match scheme.by {
+            Block::Region => validation.run(scheme, &pass.products),
+            Block::Payload | Block::Session => validation.run(scheme, &linear.products(&scheme.fold, scheme.folds)),
+        })
+        .collect();
+    let positions = |of: &DVector<f64>| -> Vec<Vector3<f64>> {
+        (0..measurements.len()).map(|row| Vector3::from(of.fixed_rows::<3>(row * pass.rows.per_row))).collect()
+    };
+    let units = data.groups.alike(measurements);
+    let structure = open_set::structure(&pass.conditions, &positions(&linear.in_sigmas(&residual)), &units);
+    let geometry_alone = linear.left(&marginal.geometry(&[]), &DVector::zeros(residual.len()));
+    let orientation_sigma_rad = sensor.orientation_sigma_rad.map(|sigma| sigma * state.orientation);
+    let analysis = Analysis {
+        moved: moved_most(&linear, &evidence, &found.best),
+        residuals: residuals(&pass.rows, measurements, &geometry_alone, &residual),
+        maps: open_set::maps(&pass.conditions, &positions(&residual)),
+        linear: &linear,
+        conditions: &pass.conditions,
+        evidence,
+        found,
+        held_out,
+        structure,
+        outliers,
+        scatter: state.scatter.clone(),
+        orientation: state.orientation,
+        measurements,
+        sensor: &Sensor { orientation_sigma_rad, ..sensor.clone() },
+        repeats: data.repeats,
+        correlation: (data.groups.rows.len() < measurements.len()).then_some(pass.weighed.correlation),
+        options,
+    };
+    Ok(verdict::put(&analysis))
+}
+
+/// Fits around what is found until nothing changes: signatures are those of the fitted arm, readings that are far off from the best model
+/// or that repeat others are weighted down, geometry and effects are fitted together, and joints that do not repeat get a variance of
+/// their own. The last pass, and what it was made around.
+fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
+    let mut state = State::nominal(data);
     let (mut last, mut looks) = (PASSES - 1, 0);
-    let mut plain = None;
-    // Around the arm as it is with the effects found so far, until nothing changes: signatures are those of the fitted arm, readings
-    // that are far off from the best model or that repeat others are weighted down, and geometry and effects are fitted together.
-    for pass in 0.. {
-        let weights: Vec<f64> = around.dependent.iter().zip(&around.far).map(|(a, b)| a * b).collect();
-        let (displacement, scatter) = (&around.displacement, &around.scatter);
-        let orientation_sigma_rad = sensor.orientation_sigma_rad.map(|sigma| sigma * around.orientation);
-        let sensor = &Sensor { orientation_sigma_rad, ..sensor.clone() };
-        let rows = rows::fit(arm, Readings { sensor, measurements, weights: &weights, displacement, scatter })?;
-        let conditions = conditions::conditions(measurements, &rows);
-        let hypotheses = options.hypotheses(&rows, &conditions, &around.ripples);
-        let (mut raw, mut candidates) = matrix(&rows, &conditions, hypotheses);
-        put_back(&mut raw, &rows, displacement);
-        let problem = Problem::new(&rows, raw);
-        let schemes = held_out::schemes(measurements, &rows.targets, &groups);
-        let grams = problem.grams(&schemes[0]);
-        let Some(surviving) = held_out::sum(&grams).surviving(&problem.offset) else {
-            return Err(DiagnosisError::Degenerate);
-        };
-        weigh(&mut candidates, &surviving);
-        let found = search::search(&surviving, &candidates, noise, search::MOST);
-        let coefficients = evidence::coefficients(&surviving, &candidates, noise, &found.best.members);
-        let residual = problem.left(&surviving, &coefficients);
-        let weighed = weights::weigh(&rows, &residual, &weights, &groups);
-        let may_tell = pass < last && scatter.is_empty() && by_repeats.is_none();
-        let ratio = weights::orientation_over_position(&rows, &residual, around.orientation != 1.0).filter(|_| may_tell);
-        let mut members: Vec<(usize, usize)> = found.best.members.clone();
-        members.sort_unstable();
-        let settled = around.is_settled(&weighed, &members);
-        let more = if pass < last {
-            let level = evidence::noise_level(&surviving, &candidates, noise, &found.best.members);
-            ripple::scan(&problem, &conditions.readings, &residual, level, &candidates)
-        } else {
-            Vec::new()
-        };
-        if pass < last && (!settled || !more.is_empty() || ratio.is_some()) {
-            let displacement = displaced(&problem, &rows, &coefficients);
-            around = around.next(weighed, displacement, members);
-            around.ripples.extend(more);
-            around.orientation *= ratio.unwrap_or(1.0);
-            continue;
+    // Without any scatter: held-out errors, and the state to go back to.
+    let mut plain: Option<(f64, State)> = None;
+    for number in 0.. {
+        let pass = Pass::new(data, &state, number)?;
+        let linear = pass.linear(&state);
+        let marginal = Marginal::new(&pass.products, None, &linear.prior).ok_or(DiagnosisError::Degenerate)?;
+        let evidence = Evidence { marginal: &marginal, candidates: &pass.candidates, noise: data.noise };
+        if number < last {
+            let may_tell = state.scatter.is_empty() && data.orientation.is_none();
+            let known = state.orientation != 1.0;
+            let ratio = weights::orientation_over_position(&pass.rows, &pass.residual, known).filter(|_| may_tell);
+            let more = ripple::scan(&linear, &pass.residual, evidence.noise_level(&pass.members));
+            if !state.is_settled(&pass) || !more.is_empty() || ratio.is_some() {
+                state = state.after(&pass);
+                state.ripples.extend(more);
+                state.orientation *= ratio.unwrap_or(1.0);
+                continue;
+            }
         }
-        let mut outliers = outliers::look(&weighed.squares, rows.per_row);
-        // What play makes of a reading whose side nobody knows says nothing about the sensor.
-        let seated = |row: &usize| {
-            !members.iter().any(|(member, _)| candidates.hypotheses[*member].shape.undecided(&conditions.readings[*row]))
-        };
-        let sure: Vec<f64> = (0..total).filter(seated).map(|row| weighed.squares[row]).collect();
-        if sure.len() < total && 2 * sure.len() >= total {
-            let far_off = std::mem::take(&mut outliers.rows);
-            outliers = outliers::Outliers { rows: far_off, ..outliers::look(&sure, rows.per_row) };
-        }
-        let good: Vec<bool> = (0..total).map(|row| !outliers.rows.contains(&row)).collect();
-        let validate = |scheme: &held_out::Scheme, good: &[bool]| {
-            let own = (scheme.by != Block::Region).then(|| problem.grams(scheme));
-            let grams = own.as_ref().unwrap_or(&grams);
-            held_out::cross_validate(&problem, scheme, good, grams, &candidates, noise, search::MOST)
-        };
         // Then, whether a joint does not repeat: its errors are no evidence of anything else. An error that comes again with the
         // configuration is no scatter.
-        let comes_again = repeats.is_some_and(|repeats| repeats.moved) && weighed.correlation > ALIKE;
-        let may_scatter = looks < LOOKS && options.only.is_none() && !comes_again;
+        let comes_again = data.repeats.is_some_and(|repeats| repeats.moved) && pass.weighed.correlation > ALIKE;
+        let may_scatter = looks < LOOKS && data.options.only.is_none() && !comes_again;
         // Repeats between which the arm moved have the scatter in them.
-        let of_sensor = NoisePrior { degrees_of_freedom: noise.degrees_of_freedom.min(UNMOVED), ..noise };
+        let of_sensor = NoisePrior { degrees_of_freedom: data.noise.degrees_of_freedom.min(UNMOVED), ..data.noise };
+        let found = Found { best: pass.members.clone(), ..Found::default() };
         let looked = may_scatter
-            .then(|| scatter::look(&rows, &problem, &surviving, &candidates, of_sensor, &found, !around.scatter.is_empty()));
-        if let Some(scatter) = looked.filter(|scatter| !scatter::alike(scatter, &around.scatter)) {
-            if around.scatter.is_empty() && plain.is_none() {
-                // Ripples were chosen with the readings that a fold leaves out: they seem to help there.
-                let mut others = candidates.clone();
-                for (active, of) in others.active.iter_mut().zip(&others.hypotheses) {
-                    *active &= !scatter::is_contested(of);
-                }
-                let without =
-                    held_out::cross_validate(&problem, &schemes[0], &good, &grams, &others, noise, search::MOST).explained();
-                plain = Some((without, good, around.clone()));
+            .then(|| scatter::look(&linear, &Evidence { noise: of_sensor, ..evidence }, &found, !state.scatter.is_empty()));
+        let held_out = |without_contested: bool| -> f64 {
+            // Ripples were chosen with the readings that a fold leaves out: they seem to help there.
+            let mut others = pass.candidates.clone();
+            for (active, of) in others.active.iter_mut().zip(&others.hypotheses) {
+                *active &= !(without_contested && scatter::is_contested(of));
             }
-            let displacement = displaced(&problem, &rows, &coefficients);
-            around = Around { scatter, ..around.next(weighed, displacement, members) };
-            (last, looks) = (pass + PASSES, looks + 1);
+            let outliers = outliers_of(data, &pass, &found);
+            let good: Vec<bool> = (0..linear.count()).map(|row| !outliers.rows.contains(&row)).collect();
+            let linear = Linear { candidates: &others, ..linear.clone() };
+            let validation = Validation { linear: &linear, noise: data.noise, good: &good, best: &[], most: MOST };
+            validation.run(&pass.scheme, &pass.products).explained()
+        };
+        if let Some(scatter) = looked.filter(|scatter| !scatter::alike(scatter, &state.scatter)) {
+            if state.scatter.is_empty() && plain.is_none() {
+                plain = Some((held_out(true), state.clone()));
+            }
+            state = State { scatter, ..state.after(&pass) };
+            (last, looks) = (number + PASSES, looks + 1);
             continue;
         }
         // Scatter has no order: where readings that were not used are predicted worse with it, it took the place of one that there is.
-        if let Some((left, good, without)) = plain.take_if(|_| !around.scatter.is_empty())
-            && validate(&schemes[0], &good).explained() > WORSE * WORSE * left
+        if let Some((left, without)) = plain.take_if(|_| !state.scatter.is_empty())
+            && held_out(false) > WORSE * WORSE * left
         {
-            around = without;
-            (last, looks) = (pass + 1, LOOKS);
+            state = without;
+            (last, looks) = (number + 1, LOOKS);
             continue;
         }
-        let held_out: Vec<held_out::HeldOut> = schemes.iter().map(|scheme| validate(scheme, &good)).collect();
-        let positions = |of: &DVector<f64>| -> Vec<Vector3<f64>> {
-            (0..total).map(|row| Vector3::from(of.fixed_rows::<3>(row * rows.per_row))).collect()
-        };
-        let moved = moved_most(&problem, &surviving, &candidates, &coefficients, &found.best.members);
-        let geometry_alone = problem.left(&surviving, &DVector::zeros(coefficients.len()));
-        let residuals = residuals(&rows, measurements, &geometry_alone, &residual);
-        let structure =
-            open_set::structure(&conditions, &positions(&problem.whitening.of_vector(&residual)), &groups.alike(measurements));
-        let maps = open_set::maps(&conditions, &positions(&residual));
-        let analysis = Analysis {
-            rows: &rows,
-            conditions: &conditions,
-            candidates: &candidates,
-            surviving: &surviving,
-            noise,
-            found,
-            held_out,
-            structure,
-            outliers,
-            scatter: around.scatter,
-            orientation: around.orientation,
-            maps,
-            residuals,
-            moved,
-            measurements,
-            sensor,
-            repeats,
-            correlation: (groups.rows.len() < total).then_some(weighed.correlation),
-            options,
-        };
-        return Ok(verdict::put(&analysis));
+        return Ok((state, pass));
     }
     unreachable!("the loop ends by returning")
 }
 
+/// Readings that are far off beside what was found.
+fn outliers_of(data: &Data<'_>, pass: &Pass, found: &Found) -> outliers::Outliers {
+    let squares = &pass.weighed.squares;
+    let per_row = pass.rows.per_row;
+    let mut outliers = outliers::look(squares, per_row);
+    // What play makes of a reading whose side nobody knows says nothing about the sensor.
+    let seated = |row: &usize| {
+        let undecided =
+            |hypothesis: usize| pass.candidates.hypotheses[hypothesis].shape.undecided(&pass.conditions.readings[*row]);
+        !found.best.iter().any(|(hypothesis, _)| undecided(*hypothesis))
+    };
+    let sure: Vec<f64> = (0..squares.len()).filter(seated).map(|row| squares[row]).collect();
+    if sure.len() < squares.len() && 2 * sure.len() >= data.measurements.len() {
+        let far_off = std::mem::take(&mut outliers.rows);
+        outliers = outliers::Outliers { rows: far_off, ..outliers::look(&sure, per_row) };
+    }
+    outliers
+}
+
 /// A data set around its calibrated geometry, ready for the evidence of single effects.
 pub struct Singles {
-    /// Whitened `[geometry | signatures | residual]`.
-    whitened: DMatrix<f64>,
-    problem: Problem,
-    candidates: Candidates,
+    pass: Pass,
+    state: State,
     noise: NoisePrior,
 }
 
@@ -337,31 +462,19 @@ impl Singles {
     /// # Errors
     /// As [`diagnose`].
     pub fn new(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], options: &Options) -> Result<Singles, DiagnosisError> {
-        let weights = vec![1.0; measurements.len()];
-        let rows = rows::fit(arm, Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[] })?;
-        let conditions = conditions::conditions(measurements, &rows);
-        let hypotheses = options.hypotheses(&rows, &conditions, &[]);
-        let (raw, candidates) = matrix(&rows, &conditions, hypotheses);
-        let groups = groups::groups(measurements);
-        let noise = noise_prior(
-            groups::repeats(measurements, &groups),
-            sensor.mean_position_sigma(measurements.iter().copied()),
-            options.noise,
-        );
-        Ok(Singles { whitened: rows.whitening.of(&raw), problem: Problem::new(&rows, raw), candidates, noise })
+        let data = Data::new(arm, sensor, measurements, options);
+        let state = State::nominal(&data);
+        Ok(Singles { pass: Pass::new(&data, &state, PASSES)?, state, noise: data.noise })
     }
 
-    /// The evidence of every hypothesis alone, at every scale of its prior: geometry taken out, marginal likelihoods. Signatures are
-    /// not multiplied with those of other hypotheses, which only sets of effects need.
+    /// The evidence of every hypothesis alone, at every scale of its prior: geometry taken out, marginal likelihoods.
     #[must_use]
-    pub fn evidence(&self) -> Vec<evidence::Model> {
-        let blocks = (0..self.candidates.hypotheses.len()).map(|hypothesis| self.candidates.columns(hypothesis));
-        let Some(surviving) = Surviving::of_blocks(&self.whitened, self.problem.geometry, &self.problem.offset, blocks) else {
+    pub fn evidence(&self) -> Vec<Extension> {
+        let linear = self.pass.linear(&self.state);
+        let Some(marginal) = Marginal::new(&self.pass.products, None, &linear.prior) else {
             return Vec::new();
         };
-        let mut candidates = self.candidates.clone();
-        weigh(&mut candidates, &surviving);
-        evidence::extensions(&surviving, &candidates, self.noise, &[])
+        Evidence { marginal: &marginal, candidates: &self.pass.candidates, noise: self.noise }.extensions(&[])
     }
 }
 
@@ -378,32 +491,24 @@ fn noise_prior(repeats: Option<Repeats>, declared_m: f64, source: NoiseSource) -
     }
 }
 
-/// What the effects do to each row, in root.
-fn displaced(problem: &Problem, rows: &Rows, coefficients: &DVector<f64>) -> Vec<Displacement> {
-    let made = problem.signatures() * coefficients;
-    made.as_slice().chunks(rows.per_row).map(|row| std::array::from_fn(|at| row.get(at).copied().unwrap_or(0.0))).collect()
-}
-
 /// Of each row, which of `members` moves it most beyond what geometry absorbs.
-fn moved_most(
-    problem: &Problem,
-    surviving: &Surviving,
-    candidates: &Candidates,
-    coefficients: &DVector<f64>,
-    members: &[(usize, usize)],
-) -> Vec<Option<usize>> {
+fn moved_most(linear: &Linear<'_>, evidence: &Evidence<'_>, members: &[(usize, usize)]) -> Vec<Option<usize>> {
+    let coefficients = evidence.coefficients(members);
     let seen: Vec<DVector<f64>> = members
         .iter()
         .map(|(hypothesis, _)| {
-            let columns = candidates.columns(*hypothesis);
-            let of = coefficients.rows(columns.start, columns.len());
-            let absorbed = surviving.absorbed.columns(columns.start, columns.len()) * of;
-            problem.signatures().columns(columns.start, columns.len()) * of - problem.raw.columns(0, problem.geometry) * absorbed
+            let columns = evidence.candidates.columns(*hypothesis);
+            let own: Vec<(usize, f64)> = coefficients.iter().copied().filter(|(column, _)| columns.contains(column)).collect();
+            let mut absorbed = DVector::zeros(linear.rows.jacobian.ncols());
+            for (column, value) in &own {
+                absorbed.axpy(*value, &evidence.marginal.absorbed(*column), 1.0);
+            }
+            linear.made(&own) - &linear.rows.jacobian * absorbed
         })
         .collect();
-    (0..problem.raw.nrows() / problem.per_row)
+    (0..linear.count())
         .map(|row| {
-            let size = |member: &usize| seen[*member].fixed_rows::<3>(row * problem.per_row).norm_squared();
+            let size = |member: &usize| seen[*member].fixed_rows::<3>(row * linear.rows.per_row).norm_squared();
             (0..members.len()).max_by(|a, b| size(a).total_cmp(&size(b)))
         })
         .collect()
@@ -424,14 +529,4 @@ fn residuals(rows: &Rows, measurements: &[&Measurement], before: &DVector<f64>, 
             }
         })
         .collect()
-}
-
-/// The residual as it would be without the effects that were taken out before the fit.
-fn put_back(raw: &mut DMatrix<f64>, rows: &Rows, displacement: &[Displacement]) {
-    let last = raw.ncols() - 1;
-    for (row, displacement) in displacement.iter().enumerate() {
-        for equation in 0..rows.per_row {
-            raw[(row * rows.per_row + equation, last)] += displacement[equation];
-        }
-    }
 }

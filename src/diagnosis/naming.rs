@@ -1,7 +1,7 @@
 //! What is named.
 
 use super::Analysis;
-use super::claims::{NAMED, SURE, claim, kind_name, place, probability, rivals};
+use super::claims::{NAMED, claim, kind_name, place};
 use super::gap::Closing;
 use super::magnitude::{magnitude, unpulled};
 use super::outcome::{Effect, Magnitude, Parameters, Place};
@@ -20,29 +20,16 @@ pub(super) struct Named {
 pub(super) fn name(analysis: &Analysis<'_>, closing: &Closing<'_>, unknown: bool) -> Named {
     let folds = closing.folds;
     let unpulled = unpulled(analysis);
-    let has_name = |hypothesis: usize| analysis.candidates.hypotheses[hypothesis].kind.is_some();
     let mut effects = Vec::new();
-    let mut of_member: Vec<Option<usize>> = vec![None; analysis.found.best.members.len()];
-    for (step, (hypothesis, _)) in analysis.found.best.members.iter().enumerate() {
+    let mut of_member: Vec<Option<usize>> = vec![None; analysis.found.best.len()];
+    for (step, (hypothesis, _)) in analysis.found.best.iter().enumerate() {
         let this = claim(analysis, *hypothesis);
-        let of = &analysis.candidates.hypotheses[*hypothesis];
-        if !has_name(*hypothesis) {
-            continue;
-        }
-        let rivalled: f64 = rivals(analysis, this).iter().map(|(_, _, share)| share).sum();
-        let probability = probability(analysis, |other| claim(analysis, other) == this) * (1.0 - rivalled);
-        let chosen = folds.iter().filter(|fold| fold.chosen.iter().any(|other| claim(analysis, *other) == this)).count();
-        // Beside something unknown a name may only stand in for it: it must be sure, the same whatever is left out, help on readings
-        // that were not used, and help more than what has no name.
-        let needed = if unknown { SURE } else { NAMED };
-        let before_unknown = analysis.found.best.members[..step].iter().all(|(other, _)| has_name(*other));
-        let helps = closing.after(step + 1) < closing.after(step);
-        // One of some thousands of ripples fits scatter, too.
-        let ripple = of.kind == Some(Kind::StrainWaveError);
-        let stable = (!ripple || helps) && (!unknown || (before_unknown && helps && 5 * chosen >= 4 * folds.len()));
-        let Some(fit) = unpulled.as_ref().filter(|_| probability >= needed && stable) else {
+        let of = &analysis.evidence.candidates.hypotheses[*hypothesis];
+        let probability = analysis.found.probability(this);
+        let Some(fit) = unpulled.as_ref().filter(|_| of.kind.is_some() && probability >= NAMED) else {
             continue;
         };
+        let chosen = folds.iter().filter(|fold| fold.chosen.iter().any(|other| claim(analysis, *other) == this)).count();
         let (before, now) = (closing.after(step), closing.after(step + 1));
         of_member[step] = Some(effects.len());
         effects.push(Effect {
@@ -77,8 +64,8 @@ fn outliers(analysis: &Analysis<'_>, closing: &Closing<'_>, unknown: bool) -> Op
         probability: outliers.probability,
         magnitude: Magnitude { value: outliers.share, unit: "1".to_owned(), ci95: outliers.share_ci95 },
         parameters: Parameters { factor: Some(outliers.factor), ..Parameters::default() },
-        held_out_rms_before_m: closing.after(usize::MAX),
-        held_out_rms_after_m: closing.after(usize::MAX),
+        held_out_rms_before_m: closing.explained(),
+        held_out_rms_after_m: closing.explained(),
         gap_closed: None,
         folds: [0, closing.folds.len()],
         detail: format!("noise about {} times that of the other readings", outliers.factor),

@@ -15,7 +15,7 @@ const USUAL: std::ops::RangeInclusive<f64> = 0.44..=2.25;
 pub(super) fn notes(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFloor, gap: &Gap) -> Vec<String> {
     let source = noise_floor.source;
     let mut notes = analysis.conditions.notes.clone();
-    notes.extend(analysis.rows.notes.iter().cloned());
+    notes.extend(analysis.linear.rows.notes.iter().cloned());
     if analysis.repeats.is_some_and(|repeats| !repeats.moved) {
         notes.push(
             "the repeats were read without a move between them: they show the sensor's noise, not what the arm repeats to"
@@ -98,7 +98,7 @@ fn rms_m(analysis: &Analysis<'_>, part: impl Fn(&Residual) -> [f64; 3]) -> f64 {
 
 /// Joints whose readings were rounded so much that it shows.
 fn rounding(analysis: &Analysis<'_>) -> Vec<String> {
-    let rows = analysis.rows;
+    let rows = analysis.linear.rows;
     let sensor_m = 3_f64.sqrt() * analysis.sigma_m();
     // By step: the joints and the square of the error that they make, m².
     let mut found: Vec<(&str, Vec<String>, f64)> = Vec::new();
@@ -147,7 +147,7 @@ fn doing_without(held_out: &HeldOut) -> Option<String> {
         Block::Payload => "payloads",
         Block::Session => "sessions",
     };
-    let count = held_out.folds.iter().filter(|fold| fold.does_without()).count();
+    let count = held_out.folds.iter().filter(|fold| fold.used < fold.chosen.len()).count();
     (count > 0).then(|| {
         format!(
             "{count} of {} folds ({what}) leave out effects that evidence chose for them, because these did not help on readings that \

@@ -8,9 +8,9 @@ use crate::effects::signature::shape::Shape;
 
 /// Of a member of the best set, from the fit that tells its magnitude.
 pub(super) fn parameters(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -> Parameters {
-    let of = &analysis.candidates.hypotheses[hypothesis];
-    let unit = analysis.candidates.unit[hypothesis];
-    let values: Vec<f64> = (analysis.candidates.columns(hypothesis).zip(&of.spread))
+    let of = &analysis.evidence.candidates.hypotheses[hypothesis];
+    let unit = analysis.evidence.candidates.unit[hypothesis];
+    let values: Vec<f64> = (analysis.evidence.candidates.columns(hypothesis).zip(&of.spread))
         .map(|(column, spread)| {
             let at = fit.columns.iter().position(|known| *known == column);
             at.map_or(0.0, |at| fit.coefficients[at] * unit * spread)

@@ -8,8 +8,8 @@ use std::ops::Range;
 
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 
-use super::evidence::{Candidates, NoisePrior, SCALES, one_signed};
-use super::gram::Surviving;
+use super::evidence::{Candidates, Evidence, NoisePrior, SCALES, one_signed};
+use super::products::Marginal;
 use crate::seed::stream;
 
 /// Share of cases in which the least magnitude is named.
@@ -45,7 +45,7 @@ pub struct Power {
 /// Finds what a data set would show.
 pub struct Bench<'a> {
     candidates: &'a Candidates,
-    surviving: &'a Surviving,
+    marginal: &'a Marginal<'a>,
     prior: NoisePrior,
     noise: f64,
     /// What is found already, each with the scale of its prior.
@@ -103,20 +103,14 @@ struct Draw {
 }
 
 impl<'a> Bench<'a> {
-    /// For data whose inner products are `surviving`, with a noise of mean square `noise` (in declared sigmas) of which `prior` is known
-    /// beforehand, and with the effects `found`, beside which everything else has to show.
+    /// For data with this `evidence`, with a noise of mean square `noise` (in declared sigmas), and with the effects `found`, beside which everything else has to show.
     #[must_use]
-    pub fn new(
-        candidates: &'a Candidates,
-        surviving: &'a Surviving,
-        prior: NoisePrior,
-        noise: f64,
-        found: &'a [(usize, usize)],
-    ) -> Bench<'a> {
+    pub fn new(evidence: &Evidence<'a>, noise: f64, found: &'a [(usize, usize)]) -> Bench<'a> {
+        let Evidence { marginal, candidates, noise: prior } = *evidence;
         let inverses = (0..candidates.hypotheses.len())
             .map(|hypothesis| {
                 let columns = candidates.columns(hypothesis);
-                let block = surviving.products.view((columns.start, columns.start), (columns.len(), columns.len())).into_owned();
+                let block = DMatrix::from_fn(columns.len(), columns.len(), |i, j| marginal.own(hypothesis, i, j));
                 firm(block).map_or_else(|| DMatrix::zeros(columns.len(), columns.len()), |cholesky| cholesky.inverse())
             })
             .collect();
@@ -133,11 +127,11 @@ impl<'a> Bench<'a> {
                 turn: stream.uniform(0.2, 1.0),
             })
             .collect();
-        Bench { candidates, surviving, prior, noise: noise.max(1e-12), found, inverses, pool }
+        Bench { candidates, marginal, prior, noise: noise.max(1e-12), found, inverses, pool }
     }
 
     fn information(&self, hypothesis: usize) -> f64 {
-        self.candidates.columns(hypothesis).map(|column| self.surviving.products[(column, column)]).sum()
+        self.marginal.information(hypothesis)
     }
 
     /// Share of the signal of `truth` that `other` can stand in for.
@@ -146,11 +140,11 @@ impl<'a> Bench<'a> {
         let inverse = &self.inverses[other];
         let (mut explained, mut all) = (0.0, 0.0);
         for column in of {
-            all += self.surviving.products[(column, column)];
+            let row = self.marginal.row(column);
+            all += row[column];
             for i in 0..by.len() {
-                let left = self.surviving.products[(by.start + i, column)];
                 for j in 0..by.len() {
-                    explained += left * inverse[(i, j)] * self.surviving.products[(by.start + j, column)];
+                    explained += row[by.start + i] * inverse[(i, j)] * row[by.start + j];
                 }
             }
         }
@@ -265,7 +259,8 @@ impl<'a> Bench<'a> {
         chosen[1..].sort_by_key(|other| !variants.contains(other));
         let columns: Vec<usize> = chosen.iter().flat_map(|member| self.candidates.columns(*member)).collect();
         let size = columns.len();
-        let mut products = DMatrix::from_fn(size, size, |i, j| self.surviving.products[(columns[i], columns[j])]);
+        let rows: Vec<_> = columns.iter().map(|column| self.marginal.row(*column)).collect();
+        let mut products = DMatrix::from_fn(size, size, |i, j| rows[i][columns[j]]);
         // What is found takes its part out of everything else.
         let fitted: Vec<(usize, f64)> = beside
             .iter()
@@ -274,10 +269,11 @@ impl<'a> Bench<'a> {
             })
             .collect();
         if !fitted.is_empty() {
+            let of_found: Vec<_> = fitted.iter().map(|(column, _)| self.marginal.row(*column)).collect();
             let normal = DMatrix::from_fn(fitted.len(), fitted.len(), |i, j| {
-                self.surviving.products[(fitted[i].0, fitted[j].0)] + if i == j { fitted[i].1 } else { 0.0 }
+                of_found[i][fitted[j].0] + if i == j { fitted[i].1 } else { 0.0 }
             });
-            let cross = DMatrix::from_fn(fitted.len(), size, |i, j| self.surviving.products[(fitted[i].0, columns[j])]);
+            let cross = DMatrix::from_fn(fitted.len(), size, |i, j| of_found[i][columns[j]]);
             products -= cross.tr_mul(&Cholesky::new(normal)?.solve(&cross));
         }
         let mut axes = DMatrix::zeros(size, size);
@@ -321,7 +317,7 @@ impl<'a> Bench<'a> {
             signal: Vec::new(),
             noise: Vec::new(),
             draws: Vec::new(),
-            half: 0.5 * (self.prior.degrees_of_freedom + self.surviving.degrees_of_freedom),
+            half: 0.5 * (self.prior.degrees_of_freedom + self.marginal.degrees_of_freedom),
             pinned: self.prior.degrees_of_freedom * self.prior.level,
         };
         self.draw(&mut world, &products, &factor, &axes, number, count);
@@ -362,7 +358,7 @@ impl<'a> Bench<'a> {
                 normal[i] += (pool.along - along) * own[i] * factor[(i, i)] / length;
             }
             let mut squares: f64 = normal.iter().map(|value| value * value).sum();
-            squares += chi_square(self.surviving.degrees_of_freedom - size as f64, pool.rest);
+            squares += chi_square(self.marginal.degrees_of_freedom - size as f64, pool.rest);
             let mut cross = 0.0;
             let mut first = 0;
             for i in 0..size {
@@ -514,7 +510,7 @@ mod tests {
     use nalgebra::DVector;
 
     use super::*;
-    use crate::diagnosis::evidence::log_posterior;
+    use crate::diagnosis::products::test_marginal;
     use crate::effects::signature::library::Hypothesis;
     use crate::effects::signature::shape::Shape;
     use crate::effects::{Kind, Location};
@@ -567,16 +563,6 @@ mod tests {
         (candidates, DMatrix::from_columns(&columns))
     }
 
-    fn surviving(signatures: &DMatrix<f64>, residual: &DVector<f64>) -> Surviving {
-        Surviving {
-            products: signatures.tr_mul(signatures),
-            with_residual: signatures.tr_mul(residual),
-            residual: residual.norm_squared(),
-            degrees_of_freedom: ROWS as f64,
-            absorbed: DMatrix::zeros(0, 0),
-        }
-    }
-
     /// Cases row by row, with the evidence of the search itself.
     #[test]
     fn the_least_magnitude_is_named_in_four_cases_of_five() {
@@ -584,8 +570,10 @@ mod tests {
         let noise: f64 = 1.7;
         for (likeness, found) in [(0.2, vec![]), (0.9, vec![]), (0.6, vec![(5, 1)])] {
             let (candidates, signatures) = problem(likeness);
-            let unit = surviving(&signatures, &DVector::zeros(ROWS));
-            let bench = Bench::new(&candidates, &unit, prior, noise, &found);
+            let products = test_marginal(&candidates, &signatures, &DVector::zeros(ROWS));
+            let unit = products.marginal();
+            let evidence = Evidence { marginal: &unit, candidates: &candidates, noise: prior };
+            let bench = Bench::new(&evidence, noise, &found);
             let base = |with: &[(usize, usize)]| [&found[..], with].concat();
             for variants in [vec![0], vec![1], vec![3, 4], vec![6]] {
                 let least = bench.power(&variants).least.unwrap();
@@ -605,13 +593,15 @@ mod tests {
                     for (member, _) in &found {
                         residual += signatures.column(candidates.first[*member]) * 2.3;
                     }
-                    let seen = surviving(&signatures, &residual);
-                    let without = log_posterior(&seen, &candidates, prior, &base(&[]));
+                    let products = test_marginal(&candidates, &signatures, &residual);
+                    let seen = products.marginal();
+                    let evidence = Evidence { marginal: &seen, candidates: &candidates, noise: prior };
+                    let without = evidence.log_posterior(&base(&[]));
                     let (mut own, mut all, mut best) = (0.0, 1.0, (0.0, false));
                     for member in (0..candidates.hypotheses.len()).filter(|member| found.iter().all(|(other, _)| other != member))
                     {
                         for scale in 0..SCALES.len() {
-                            let log = log_posterior(&seen, &candidates, prior, &base(&[(member, scale)])) - without;
+                            let log = evidence.log_posterior(&base(&[(member, scale)])) - without;
                             all += log.exp();
                             if variants.contains(&member) {
                                 own += log.exp();
@@ -635,15 +625,21 @@ mod tests {
         let (candidates, mut signatures) = problem(0.2);
         let copy = signatures.column(0) * 1.0;
         signatures.set_column(1, &copy);
-        let unit = surviving(&signatures, &DVector::zeros(ROWS));
-        let bench = Bench::new(&candidates, &unit, NoisePrior { degrees_of_freedom: 10.0, level: 1.0 }, 1.0, &[]);
+        let noise = NoisePrior { degrees_of_freedom: 10.0, level: 1.0 };
+        let products = test_marginal(&candidates, &signatures, &DVector::zeros(ROWS));
+        let unit = products.marginal();
+        let evidence = Evidence { marginal: &unit, candidates: &candidates, noise };
+        let bench = Bench::new(&evidence, 1.0, &[]);
         // Of two that are the same the one that is less likely beforehand is never named.
         let power = bench.power(&[1]);
         assert_eq!(power.least, None);
         assert!(power.alike.is_some_and(|(other, likeness)| other == 0 && likeness > 0.999));
         signatures.fill_column(8, 0.0);
-        let unit = surviving(&signatures, &DVector::zeros(ROWS));
-        let bench = Bench::new(&candidates, &unit, NoisePrior { degrees_of_freedom: 10.0, level: 1.0 }, 1.0, &[]);
+        let noise = NoisePrior { degrees_of_freedom: 10.0, level: 1.0 };
+        let products = test_marginal(&candidates, &signatures, &DVector::zeros(ROWS));
+        let unit = products.marginal();
+        let evidence = Evidence { marginal: &unit, candidates: &candidates, noise };
+        let bench = Bench::new(&evidence, 1.0, &[]);
         assert_eq!(bench.power(&[6]), Power { least: None, alike: None });
     }
 

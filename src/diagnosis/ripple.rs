@@ -3,10 +3,9 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::evidence::Candidates;
-use super::held_out::Problem;
+use super::linear::Linear;
 use crate::effects::signature::library::RIPPLES;
-use crate::effects::signature::shape::{Reading, Shape};
+use crate::effects::signature::shape::Shape;
 
 /// Drop of the residual's square, in squares of the noise, from which on a ripple is worth a hypothesis: what the strongest of some
 /// thousands of ripples reaches by chance.
@@ -27,17 +26,12 @@ pub(super) struct Ripple {
 
 /// The strongest ripple of each joint in `residual` (m, rad), whose noise has the mean square `level` in declared sigmas; the strongest
 /// first, none that is weak or a candidate already.
-pub(super) fn scan(
-    problem: &Problem,
-    readings: &[Reading],
-    residual: &DVector<f64>,
-    level: f64,
-    candidates: &Candidates,
-) -> Vec<Ripple> {
+pub(super) fn scan(linear: &Linear<'_>, residual: &DVector<f64>, level: f64) -> Vec<Ripple> {
     use rayon::prelude::*;
-    let geometry = problem.geometry;
-    let jacobian = problem.whitening.of(&problem.raw.columns(0, geometry).into_owned()).transpose();
-    let residual = problem.whitening.of_vector(residual);
+    let (readings, candidates) = (linear.readings, linear.candidates);
+    let geometry = linear.rows.jacobian.ncols();
+    let jacobian = linear.rows.whitening.of(&linear.rows.jacobian).transpose();
+    let residual = linear.in_sigmas(residual);
     let Some(normal) = Cholesky::new(&jacobian * jacobian.transpose() + DMatrix::identity(geometry, geometry)) else {
         return Vec::new();
     };
@@ -50,13 +44,13 @@ pub(super) fn scan(
         .into_par_iter()
         .filter(|joint| !readings[0].slides[*joint])
         .filter_map(|joint| {
-            let per_row = problem.per_row;
+            let per_row = linear.rows.per_row;
             // Of each reading: what a unit turn of the joint does, against geometry, itself and the residual.
             let mut mixed = DMatrix::zeros(geometry, readings.len());
             let (mut own, mut with) = (vec![0.0; readings.len()], vec![0.0; readings.len()]);
             for (row, reading) in readings.iter().enumerate() {
                 let moved = DVector::from_row_slice(&reading.moved(joint, 1.0)[..per_row]);
-                let moved = problem.whitening.of_row(row, moved.rows(0, per_row));
+                let moved = linear.rows.whitening.of_row(row, moved.rows(0, per_row));
                 for (axis, value) in moved.iter().enumerate() {
                     let equation = row * per_row + axis;
                     own[row] += value * value;

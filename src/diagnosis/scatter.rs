@@ -6,9 +6,8 @@
 use nalgebra::{DVector, DVectorView, Matrix3, Vector3};
 
 use super::candidates::odds_of_one_more_nameless;
-use super::evidence::{Candidates, NoisePrior, coefficients, log_posterior};
-use super::gram::Surviving;
-use super::held_out::Problem;
+use super::evidence::{Evidence, NoisePrior};
+use super::linear::Linear;
 use super::rows::Rows;
 use super::search::Found;
 use super::whitening::Whitening;
@@ -81,36 +80,32 @@ pub(super) fn is_contested(of: &Hypothesis) -> bool {
 
 /// The joints that scatter, given what was found, most likely first. `known`: some scatter was in the noise already when that was found, so
 /// that its ripples and bumps do not stand in for it.
-pub(super) fn look(
-    rows: &Rows,
-    problem: &Problem,
-    surviving: &Surviving,
-    candidates: &Candidates,
-    noise: NoisePrior,
-    found: &Found,
-    known: bool,
-) -> Vec<Scatter> {
-    let all = &found.best.members;
+pub(super) fn look(linear: &Linear<'_>, evidence: &Evidence<'_>, found: &Found, known: bool) -> Vec<Scatter> {
+    let (rows, candidates, noise) = (linear.rows, evidence.candidates, evidence.noise);
+    let all = &found.best;
     let fewer: Vec<(usize, usize)> =
         all.iter().filter(|(member, _)| !is_contested(&candidates.hypotheses[*member])).copied().collect();
     // What ripples and bumps are worth where the noise is the sensor's.
-    let worth = log_posterior(surviving, candidates, noise, all) - log_posterior(surviving, candidates, noise, &fewer);
+    let worth = evidence.log_posterior(all) - evidence.log_posterior(&fewer);
     let odds = odds_of_one_more_nameless(candidates, rows.mechanism.joint_count());
-    let left = |members: &[(usize, usize)]| problem.left(surviving, &coefficients(surviving, candidates, noise, members));
+    let left = |members: &[(usize, usize)]| {
+        let coefficients = evidence.coefficients(members);
+        linear.left(&evidence.marginal.geometry(&coefficients), &linear.made(&coefficients))
+    };
     let mut trials = vec![(left(all), 0.0)];
     if fewer.len() < all.len() && !known {
         trials.push((left(&fewer), worth));
     }
     let mut best: (f64, Vec<Scatter>) = (0.0, Vec::new());
     for (residual, lost) in trials {
-        let all = Left::new(rows, problem, &residual, rows.per_row);
+        let all = Left::new(rows, &residual, rows.per_row);
         // Orientations may be less exact than they are said to be, which is no joint's doing.
-        let position = Left::new(rows, problem, &residual, 3);
+        let position = Left::new(rows, &residual, 3);
         let mut scatter: Vec<Scatter> = Vec::new();
         let mut total = -lost;
         while scatter.len() < MOST {
             let tried = (0..rows.mechanism.joint_count()).filter(|joint| !scatter.iter().any(|one| one.joint == *joint));
-            let values = tried.map(|joint| all.value(surviving.degrees_of_freedom, noise, &scatter, joint));
+            let values = tried.map(|joint| all.value(evidence.marginal.degrees_of_freedom, noise, &scatter, joint));
             match values.max_by(|a, b| a.0.total_cmp(&b.0)) {
                 Some((gain, one))
                     if gain + odds > position.lopsided(&scatter).max(0.0) && position.along(&scatter, one.joint) > ALONG =>
@@ -141,10 +136,10 @@ struct Left<'a> {
 
 impl<'a> Left<'a> {
     /// The first `per_row` equations of each row.
-    fn new(rows: &'a Rows, problem: &Problem, residual: &DVector<f64>, per_row: usize) -> Left<'a> {
+    fn new(rows: &'a Rows, residual: &DVector<f64>, per_row: usize) -> Left<'a> {
         let first = |at: usize| residual[at / per_row * rows.per_row + at % per_row];
         let residual = DVector::from_fn(per_row * rows.postures.len(), |at, _| first(at));
-        Left { rows, whitening: problem.whitening.of_sensor(per_row), residual, per_row }
+        Left { rows, whitening: rows.whitening.of_sensor(per_row), residual, per_row }
     }
 
     /// What makes the equations alike beside the scatter of `others`.

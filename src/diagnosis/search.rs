@@ -1,225 +1,216 @@
-//! The search over sets of effects: forward with a beam, then swaps and deletions, and the probabilities that come of it.
+//! The search over sets of effects and the probabilities that come of it: a climb to the likeliest set by adding, exchanging and taking
+//! away, then a walk about it by Gibbs sampling, in which each cause in turn is drawn anew beside all others.
+//!
+//! The cost of a step is linear in the number of effects, so that a set may have twenty. Probabilities are means of the exact
+//! conditional ones over the walk (Rao and Blackwell's), so that few rounds do.
 
 use std::collections::BTreeMap;
 
-use super::evidence::{Candidates, Model, NoisePrior, SCALES, extensions, log_posterior};
-use super::gram::Surviving;
-use crate::effects::signature::shape::Shape;
+use super::evidence::{Evidence, Extension};
 use crate::effects::{Kind, Location};
+use crate::seed::stream;
 
-/// Most effects of a set.
-pub const MOST: usize = 6;
-/// Sets kept at each size.
-const BEAM: usize = 5;
-/// Differences of log posterior beyond which a model adds nothing to a probability.
-const NEGLIGIBLE: f64 = 14.0;
+/// Rounds of the walk: in each, every cause is drawn anew once.
+const ROUNDS: usize = 16;
+/// Probability from which on a cause needs no more rounds.
+const CERTAIN: f64 = 0.995;
+/// Places for causes that are not in the likeliest set.
+const SPARE: usize = 1;
+/// Additions whose posterior is computed exactly: how signs shift beside a new member is left out at first.
+const EXACT: usize = 6;
+
+/// What is claimed: a kind (or none) at a place.
+pub type Claim = (Option<Kind>, Location);
+
+/// A claim with its probability and the hypothesis that stands for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Belief {
+    /// The claim.
+    pub claim: Claim,
+    /// Its likeliest variant.
+    pub hypothesis: usize,
+    /// That it is there.
+    pub probability: f64,
+}
 
 /// What a search found.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Found {
-    /// The best variant of the most likely set of kinds at places, its members in the order in which they help most.
-    pub best: Model,
-    /// Models with their posterior probabilities among all explored, most likely first.
-    pub models: Vec<(Vec<(usize, usize)>, f64)>,
+    /// The likeliest set: hypotheses and scales of their priors, in the order in which they help most.
+    pub best: Vec<(usize, usize)>,
+    /// Of each member of the best set, what may be in its place, likeliest first; what is missing from one is that nothing is.
+    pub causes: Vec<Vec<Belief>>,
+    /// Every claim with its probability, likeliest first.
+    pub claims: Vec<Belief>,
 }
 
-type Key = Vec<usize>;
-
-/// Kinds (or none) at places, sorted.
-type Claims = Vec<(Option<Kind>, Location)>;
-
-/// Models explored: of each set of hypotheses, the best scales and the logarithm of the sum over scales.
-#[derive(Default)]
-struct Explored {
-    sets: BTreeMap<Key, BTreeMap<Vec<usize>, Model>>,
-}
-
-impl Explored {
-    fn add(&mut self, model: Model) {
-        let mut sorted = model.members.clone();
-        sorted.sort_unstable();
-        let key: Key = sorted.iter().map(|(hypothesis, _)| *hypothesis).collect();
-        let scales: Vec<usize> = sorted.iter().map(|(_, scale)| *scale).collect();
-        let of_set = self.sets.entry(key).or_default();
-        match of_set.get_mut(&scales) {
-            Some(known) if known.log_posterior >= model.log_posterior => {}
-            Some(known) => *known = model,
-            None => {
-                of_set.insert(scales, model);
-            }
-        }
-    }
-
-    fn best(&self) -> Option<&Model> {
-        self.sets.values().flat_map(BTreeMap::values).max_by(|a, b| a.log_posterior.total_cmp(&b.log_posterior))
+impl Found {
+    /// The probability of `claim`.
+    #[must_use]
+    pub fn probability(&self, claim: Claim) -> f64 {
+        self.claims.iter().find(|belief| belief.claim == claim).map_or(0.0, |belief| belief.probability)
     }
 }
 
-/// Searches. `most`: effects of a set at most.
+/// The claim of hypothesis number `hypothesis`.
+fn claim(evidence: &Evidence<'_>, hypothesis: usize) -> Claim {
+    let of = &evidence.candidates.hypotheses[hypothesis];
+    (of.kind, of.location)
+}
+
+/// The likeliest set that can be reached from `start`, of `most` effects at most, and the logarithm of its posterior.
 #[must_use]
-pub fn search(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior, most: usize) -> Found {
-    let empty = Model { members: Vec::new(), log_posterior: 0.0 };
-    // An extension knows what the new member's sign is worth, not how it shifts those of the others.
-    let exact = |model: &Model| Model {
-        members: model.members.clone(),
-        log_posterior: log_posterior(surviving, candidates, noise, &model.members),
+pub fn climb(evidence: &Evidence<'_>, start: &[(usize, usize)], most: usize) -> (Vec<(usize, usize)>, f64) {
+    let mut members = start.to_vec();
+    let mut value = evidence.log_posterior(&members);
+    loop {
+        while members.len() < most {
+            match best_addition(evidence, &members) {
+                Some((member, better)) if better > value + 1e-6 => {
+                    members.push(member);
+                    value = better;
+                }
+                _ => break,
+            }
+        }
+        let exchanges = (0..members.len()).filter_map(|at| {
+            let mut fewer = members.clone();
+            let own = fewer.remove(at);
+            let without = (evidence.log_posterior(&fewer), fewer.clone());
+            let with = best_addition(evidence, &fewer).filter(|(member, _)| *member != own).map(|(member, better)| {
+                fewer.push(member);
+                (better, fewer)
+            });
+            with.into_iter().chain([without]).max_by(|a, b| a.0.total_cmp(&b.0))
+        });
+        match exchanges.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((better, other)) if better > value + 1e-6 => (value, members) = (better, other),
+            _ => return (members, value),
+        }
+    }
+}
+
+fn best_addition(evidence: &Evidence<'_>, members: &[(usize, usize)]) -> Option<((usize, usize), f64)> {
+    let mut found = evidence.extensions(members);
+    found.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior).then(a.member.cmp(&b.member)));
+    let exact = found.iter().take(EXACT).map(|extension| {
+        let with: Vec<(usize, usize)> = members.iter().copied().chain([extension.member]).collect();
+        (extension.member, evidence.log_posterior(&with))
+    });
+    exact.max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Searches from `start` on. `most`: effects of a set at most.
+#[must_use]
+pub fn search(evidence: &Evidence<'_>, start: &[(usize, usize)], most: usize) -> Found {
+    let (best, _) = climb(evidence, start, most);
+    walk(evidence, &best, most)
+}
+
+/// Probabilities of claims in one draw: how likely each is, and which variant stands for it.
+type Weights = BTreeMap<Claim, (f64, f64, usize)>;
+
+fn add(weights: &mut Weights, claim: Claim, probability: f64, hypothesis: usize) {
+    let known = weights.entry(claim).or_insert((0.0, 0.0, hypothesis));
+    known.0 += probability;
+    if probability > known.1 {
+        (known.1, known.2) = (probability, hypothesis);
+    }
+}
+
+/// The walk about the set `best`.
+fn walk(evidence: &Evidence<'_>, best: &[(usize, usize)], most: usize) -> Found {
+    let mut stream = stream(1, "diagnosis/walk");
+    let mut places: Vec<Option<(usize, usize)>> = best.iter().copied().map(Some).collect();
+    places.extend(vec![None; SPARE.min(most.saturating_sub(best.len()))]);
+    let mut of_place: Vec<Weights> = vec![Weights::new(); places.len()];
+    let mut all: Weights = Weights::new();
+    let mut rounds = 0;
+    for round in 0..ROUNDS {
+        let mut of_round: Weights = Weights::new();
+        let mut certain = true;
+        for place in 0..places.len() {
+            let others: Vec<(usize, usize)> =
+                places.iter().enumerate().filter(|(other, _)| *other != place).filter_map(|(_, member)| *member).collect();
+            let nothing = evidence.log_posterior(&others);
+            let extensions = evidence.extensions(&others);
+            let top = extensions.iter().map(|extension| extension.log_posterior).fold(nothing, f64::max);
+            let weight = |extension: &Extension| libm::exp(extension.log_posterior - top);
+            let nothing = libm::exp(nothing - top);
+            let total = nothing + extensions.iter().map(weight).sum::<f64>();
+            let mut here: Weights = Weights::new();
+            let mut drawn = stream.unit() * total - nothing;
+            let mut next = None;
+            for extension in &extensions {
+                let weight = weight(extension);
+                if weight < 1e-9 * total {
+                    continue;
+                }
+                add(&mut here, claim(evidence, extension.member.0), weight / total, extension.member.0);
+                if drawn > 0.0 {
+                    drawn -= weight;
+                    next = Some(extension.member);
+                }
+            }
+            places[place] = next;
+            certain &= here.values().map(|(probability, ..)| *probability).fold(nothing / total, f64::max) > CERTAIN;
+            for (claim, (probability, _, hypothesis)) in here {
+                add(&mut of_place[place], claim, probability, hypothesis);
+                add(&mut of_round, claim, probability, hypothesis);
+            }
+        }
+        for (claim, (probability, _, hypothesis)) in of_round {
+            add(&mut all, claim, probability.min(1.0), hypothesis);
+        }
+        rounds += 1;
+        if certain && round > 0 {
+            break;
+        }
+    }
+    let beliefs = |weights: Weights| {
+        let belief = |(claim, (sum, _, hypothesis)): (Claim, (f64, f64, usize))| Belief {
+            claim,
+            hypothesis,
+            probability: (sum / f64::from(rounds)).min(1.0),
+        };
+        let mut beliefs: Vec<Belief> = weights.into_iter().map(belief).collect();
+        beliefs.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.hypothesis.cmp(&b.hypothesis)));
+        beliefs
     };
-    let mut explored = Explored::default();
-    explored.add(empty.clone());
-    let mut beam = vec![empty];
-    for _ in 0..most {
-        let mut next: Vec<Model> = Vec::new();
-        for model in &beam {
-            let found = extensions(surviving, candidates, noise, &model.members);
-            next.extend(found);
-        }
-        next.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
-        let best_before = explored.best().map_or(0.0, |best| best.log_posterior);
-        let Some(best_now) = next.first().map(|model| model.log_posterior) else {
-            break;
-        };
-        for model in next.iter().take_while(|model| model.log_posterior > best_now.max(best_before) - NEGLIGIBLE) {
-            explored.add(exact(model));
-        }
-        // Two sets that differ in a scale only are one.
-        beam.clear();
-        for model in next {
-            let same = |other: &Model| {
-                let key = |model: &Model| {
-                    let mut key: Key = model.members.iter().map(|(hypothesis, _)| *hypothesis).collect();
-                    key.sort_unstable();
-                    key
-                };
-                key(other) == key(&model)
-            };
-            if !beam.iter().any(same) {
-                beam.push(model);
-            }
-            if beam.len() >= BEAM {
-                break;
-            }
-        }
-        if best_now < best_before - 6.0 {
-            break;
-        }
-    }
-    one_by_one(surviving, candidates, noise, &mut explored);
-    // Swaps and deletions about the best, until there is none better.
-    for _ in 0..6 {
-        let Some(best) = explored.best().cloned() else {
-            break;
-        };
-        for leave in 0..best.members.len() {
-            let mut fewer = best.members.clone();
-            fewer.remove(leave);
-            let log_posterior = log_posterior(surviving, candidates, noise, &fewer);
-            explored.add(Model { members: fewer.clone(), log_posterior });
-            for model in extensions(surviving, candidates, noise, &fewer) {
-                if model.log_posterior > best.log_posterior - NEGLIGIBLE {
-                    explored.add(exact(&model));
-                }
-            }
-        }
-        let yields = |(member, _): &&(usize, usize)| candidates.hypotheses[*member].kind == Some(Kind::JointCompliance);
-        if best.members.len() - best.members.iter().filter(yields).count() < most {
-            for model in extensions(surviving, candidates, noise, &best.members) {
-                if model.log_posterior > best.log_posterior - NEGLIGIBLE {
-                    explored.add(exact(&model));
-                }
-            }
-        }
-        if explored.best().is_some_and(|now| now.log_posterior <= best.log_posterior + 1e-9) {
-            break;
-        }
-    }
-    let top = explored.best().map_or(0.0, |best| best.log_posterior);
-    let mut models = Vec::new();
-    let mut total = 0.0;
-    // What is claimed, whatever the variant: a step has as many as there are moments.
-    let mut claims: BTreeMap<Claims, (f64, &Model)> = BTreeMap::new();
-    for of_set in explored.sets.values() {
-        let weight: f64 = of_set.values().map(|model| libm::exp(model.log_posterior - top)).sum();
-        let Some(best) = of_set.values().max_by(|a, b| a.log_posterior.total_cmp(&b.log_posterior)) else {
+    let mut members = Vec::new();
+    let mut causes = Vec::new();
+    for (place, weights) in of_place.into_iter().enumerate() {
+        let beliefs = beliefs(weights);
+        let nothing = 1.0 - beliefs.iter().map(|belief| belief.probability).sum::<f64>();
+        let Some(likeliest) = beliefs.first().copied().filter(|belief| belief.probability >= nothing) else {
             continue;
         };
-        models.push((best.members.clone(), weight));
-        total += weight;
-        let claim = |(member, _): &(usize, usize)| (candidates.hypotheses[*member].kind, candidates.hypotheses[*member].location);
-        let mut claimed: Claims = best.members.iter().map(claim).collect();
-        claimed.sort_unstable();
-        let known = claims.entry(claimed).or_insert((0.0, best));
-        known.0 += weight;
-        if best.log_posterior > known.1.log_posterior {
-            known.1 = best;
+        let excluded = |(other, _): &(usize, usize)| evidence.candidates.exclude(*other, likeliest.hypothesis);
+        if members.iter().any(excluded) {
+            continue;
         }
+        let own = best.get(place).copied().filter(|(member, _)| claim(evidence, *member) == likeliest.claim);
+        members.push(own.unwrap_or((likeliest.hypothesis, 1)));
+        causes.push(beliefs);
     }
-    let best = claims.values().max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, model)| (*model).clone());
-    let best = best.unwrap_or(Model { members: Vec::new(), log_posterior: 0.0 });
-    for (_, weight) in &mut models {
-        *weight /= total;
-    }
-    models.sort_by(|a, b| b.1.total_cmp(&a.1));
-    models.truncate(400);
-    let members = in_order(surviving, candidates, noise, &best.members);
-    Found { best: Model { members, ..best }, models }
-}
-
-/// Where all joints are said to yield alike, lets each yield by itself, as far as that is better: no swap of one for one goes there.
-fn one_by_one(surviving: &Surviving, candidates: &Candidates, noise: NoisePrior, explored: &mut Explored) {
-    let Some(best) = explored.best().cloned() else {
-        return;
-    };
-    let shape = |member: usize| candidates.hypotheses[member].shape;
-    if !best.members.iter().any(|(member, _)| shape(*member) == Shape::AllYield) {
-        return;
-    }
-    let alone = |member: usize| candidates.active[member] && matches!(shape(member), Shape::Torque(_));
-    let mut members: Vec<(usize, usize)> =
-        best.members.iter().copied().filter(|(member, _)| shape(*member) != Shape::AllYield).collect();
-    for member in (0..candidates.hypotheses.len()).filter(|member| alone(*member)) {
-        if !members.iter().any(|(known, _)| candidates.exclude(*known, member)) {
-            members.push((member, 0));
-        }
-    }
-    let value = |members: &[(usize, usize)]| log_posterior(surviving, candidates, noise, members);
-    let mut now = value(&members);
-    loop {
-        explored.add(Model { members: members.clone(), log_posterior: now });
-        let mut tries: Vec<Vec<(usize, usize)>> = Vec::new();
-        for at in 0..members.len() {
-            let mut fewer = members.clone();
-            fewer.remove(at);
-            tries.push(fewer);
-            for scale in (0..SCALES.len()).filter(|scale| *scale != members[at].1) {
-                let mut other = members.clone();
-                other[at].1 = scale;
-                tries.push(other);
-            }
-        }
-        let valued = tries.into_iter().map(|members| (value(&members), members));
-        match valued.max_by(|a, b| a.0.total_cmp(&b.0)) {
-            Some((better, next)) if better > now + 1e-9 => (now, members) = (better, next),
-            _ => break,
-        }
+    let order = in_order(evidence, &members);
+    Found {
+        best: order.iter().map(|at| members[*at]).collect(),
+        causes: order.iter().map(|at| causes[*at].clone()).collect(),
+        claims: beliefs(all),
     }
 }
 
-/// The members in the order in which each adds most to what those before it explain.
-fn in_order(
-    surviving: &Surviving,
-    candidates: &Candidates,
-    noise: NoisePrior,
-    members: &[(usize, usize)],
-) -> Vec<(usize, usize)> {
-    let mut left = members.to_vec();
-    let mut ordered: Vec<(usize, usize)> = Vec::new();
+/// Places of the members in the order in which each adds most to what those before it explain.
+fn in_order(evidence: &Evidence<'_>, members: &[(usize, usize)]) -> Vec<usize> {
+    let mut left: Vec<usize> = (0..members.len()).collect();
+    let mut ordered: Vec<usize> = Vec::new();
     while !left.is_empty() {
-        let value = |member: &(usize, usize)| {
-            let mut with = ordered.clone();
-            with.push(*member);
-            log_posterior(surviving, candidates, noise, &with)
+        let value = |at: usize| {
+            let with: Vec<(usize, usize)> = ordered.iter().chain([&at]).map(|at| members[*at]).collect();
+            evidence.log_posterior(&with)
         };
-        let values: Vec<f64> = left.iter().map(value).collect();
+        let values: Vec<f64> = left.iter().map(|at| value(*at)).collect();
         let next = (0..left.len()).max_by(|a, b| values[*a].total_cmp(&values[*b])).unwrap_or(0);
         ordered.push(left.remove(next));
     }

@@ -1,10 +1,9 @@
 //! The diagnosis of arms whose fault is known, made by other means than the signatures: joint angles that are off, with torques from
 //! the slope of the potential energy.
 
-use nalgebra::{DMatrix, UnitQuaternion, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, UnitQuaternion, Vector3};
 use serde_json::Value;
 
-use super::gram::Gram;
 use super::held_out::{Fold, used};
 use super::outcome::{Diagnosis, NoiseSource, Verdict};
 use super::{Options, diagnose};
@@ -204,16 +203,6 @@ fn too_few_readings_are_refused_and_swapped_joints_are_said() {
     assert!(message.contains("swapped"), "{message}");
 }
 
-#[test]
-fn a_fold_less_is_a_subtraction() {
-    let mut stream = stream(3, "test/gram");
-    let matrix = DMatrix::from_fn(30, 6, |_, _| stream.normal());
-    let all = Gram::new(&matrix, 2);
-    let part = Gram::new(&matrix.rows(0, 12).into_owned(), 2);
-    let rest = Gram::new(&matrix.rows(12, 18).into_owned(), 2);
-    assert!((all.without(&part).products - rest.products).norm() < 1e-12);
-}
-
 /// Checks what the schema of this program uses of JSON Schema: types, enums, required, items, bounds, references, anyOf.
 pub(crate) fn check(root: &Value, schema: &Value, value: &Value, path: &str) -> Result<(), String> {
     let wrong = |what: &str| Err(format!("{path}: {what}: {value}"));
@@ -346,9 +335,11 @@ fn a_fold_uses_what_helped_the_others() {
         rows: 10,
         nominal: 100.0,
         geometry,
-        explained: vec![one, two],
+        with_best: vec![one],
+        explained: geometry,
+        with_chosen: vec![one, two],
         chosen: vec![3, 5],
-        models: Vec::new(),
+        used: 0,
     };
     let with = |squares: &[[f64; 3]]| -> Vec<usize> {
         let folds: Vec<Fold> = squares.iter().map(|squares| fold(*squares)).collect();
@@ -359,14 +350,13 @@ fn a_fold_uses_what_helped_the_others() {
     // The second makes worse what geometry leaves; so do both.
     assert_eq!(with(&[[9.0, 8.0, 12.0], [8.0, 7.5, 11.0], [9.0, 9.0, 13.0], [7.0, 6.0, 9.5]]), [1; 4]);
     assert_eq!(with(&[[9.0, 10.0, 12.0], [8.0, 9.5, 11.0], [9.0, 11.0, 13.0], [7.0, 9.0, 9.5]]), [0; 4]);
-    // Worse in one fold and better in the others is chance; to the fold itself its own loss says nothing.
-    assert_eq!(with(&[[9.0, 8.0, 7.0], [8.0, 7.0, 6.0], [9.0, 8.0, 16.0], [7.0, 6.0, 6.0]]), [2; 4]);
+    // What one fold loses counts against the gains of the others, to the fold itself its own loss says nothing.
+    assert_eq!(with(&[[9.0, 8.0, 7.0], [8.0, 7.0, 6.0], [9.0, 8.0, 16.0], [7.0, 6.0, 6.0]]), [1, 1, 2, 1]);
+    // However wild a fold goes, the guard fires.
+    assert_eq!(with(&[[9.0, 5.0, 4.0], [8.0, 4.0, 3.0], [9.0, 6.0, 5.0], [7.0, 4.0, 2.0], [7.0, 4.0, 1e9]]), [1, 1, 1, 1, 2]);
     // Two folds cannot tell.
     assert_eq!(with(&[[9.0, 10.0, 12.0], [8.0, 9.5, 11.0]]), [2; 2]);
-    let mut left_out = fold([9.0, 10.0, 12.0]);
-    assert!(!left_out.does_without() && left_out.all() == 12.0 && left_out.with(1) == 10.0);
-    left_out.explained.clear();
-    assert!(left_out.does_without() && left_out.all() == 9.0);
+    assert!(fold([9.0, 10.0, 12.0]).with(1) == 10.0 && fold([9.0, 10.0, 12.0]).with(0) == 9.0);
 }
 
 #[test]
@@ -388,25 +378,71 @@ fn what_a_table_got_wrong_is_named() {
     says(&|row| row.joints = vec![0.1; 8], "1 different configurations");
 }
 
+/// Everything that evidence is made of, against the whole system solved at once.
 #[test]
-fn single_effects_are_weighed_as_in_the_whole() {
+fn what_survives_of_the_geometry_is_that_of_the_whole_system() {
     let (arm, rows) =
         readings("test/singles", |_, _, approach, joint, _| if joint == 2 { -2e-4 * f64::from(approach[2]) } else { 0.0 });
     let rows: Vec<&Measurement> = rows.iter().collect();
-    let options = Options::new(NoiseSource::Declared);
-    let singles = super::Singles::new(&arm, &sensor(), &rows, &options).unwrap();
-    let quick = singles.evidence();
-    // From all inner products.
-    let whole = Gram::new(&singles.whitened, singles.problem.geometry).surviving(&singles.problem.offset).unwrap();
-    let mut candidates = singles.candidates.clone();
-    super::weigh(&mut candidates, &whole);
-    let slow = super::evidence::extensions(&whole, &candidates, singles.noise, &[]);
-    assert_eq!(quick.len(), slow.len());
-    for (quick, slow) in quick.iter().zip(&slow) {
-        assert_eq!(quick.members, slow.members);
-        let scale = slow.log_posterior.abs().max(1.0);
-        assert!((quick.log_posterior - slow.log_posterior).abs() < 1e-6 * scale, "{quick:?} {slow:?}");
+    let (options, sensor) = (Options::new(NoiseSource::Declared), sensor());
+    let data = super::Data::new(&arm, &sensor, &rows, &options);
+    let state = super::State { scale: 0.3, ..super::State::nominal(&data) };
+    let pass = super::Pass::new(&data, &state, super::PASSES).unwrap();
+    let linear = pass.linear(&state);
+    let out = 1;
+    let marginal = super::Marginal::new(&pass.products, Some(out), &linear.prior).unwrap();
+    let kept: Vec<usize> = (0..rows.len()).filter(|row| pass.scheme.fold[*row] != out).collect();
+    let geometry = pass.rows.jacobian.ncols();
+    let active: Vec<usize> = (0..pass.candidates.hypotheses.len()).filter(|number| pass.candidates.active[*number]).collect();
+    let chosen = [(active[2], 1), (active[40], 0), (active[130], 2)];
+    let columns: Vec<usize> = chosen.iter().flat_map(|(member, _)| pass.candidates.columns(*member)).collect();
+    // [geometry | signatures | residual], then the geometry's prior as rows of its own.
+    let mut whole = DMatrix::zeros(3 * rows.len(), geometry + columns.len() + 1);
+    whole.columns_mut(0, geometry).copy_from(&pass.rows.jacobian);
+    for (at, column) in columns.iter().enumerate() {
+        whole.set_column(geometry + at, &linear.made(&[(*column, 1.0)]));
     }
-    let best = quick.iter().max_by(|a, b| a.log_posterior.total_cmp(&b.log_posterior)).unwrap();
-    assert_eq!(candidates.hypotheses[best.members[0].0].kind, Some(Kind::Backlash));
+    whole.set_column(geometry + columns.len(), &linear.residual);
+    let mut whole = pass.rows.whitening.of_rows(&whole, &kept);
+    let first = whole.nrows();
+    whole = whole.insert_rows(first, geometry, 0.0);
+    for parameter in 0..geometry {
+        let sigma = if linear.prior.free[parameter] { 1.0 } else { 0.3 };
+        whole[(first + parameter, parameter)] = 1.0 / sigma;
+        whole[(first + parameter, geometry + columns.len())] = -linear.prior.offset[parameter] / sigma;
+    }
+    let jacobian = whole.columns(0, geometry).into_owned();
+    let rest = whole.columns(geometry, columns.len() + 1).into_owned();
+    let normal = Cholesky::new(jacobian.transpose() * &jacobian).unwrap();
+    let left = &rest - &jacobian * normal.solve(&(jacobian.transpose() * &rest));
+    let products = left.transpose() * &left;
+    let near = |a: f64, b: f64, size: f64| assert!((a - b).abs() < 1e-8 * size, "{a} {b}");
+    let last = columns.len();
+    for (i, column) in columns.iter().enumerate() {
+        let size = products[(i, i)].max(1e-9);
+        for (j, other) in columns.iter().enumerate() {
+            near(marginal.row(*column)[*other], products[(i, j)], libm::sqrt(size * products[(j, j)].max(1e-9)) * 10.0);
+        }
+        near(marginal.with_residual[*column], products[(i, last)], libm::sqrt(size * products[(last, last)]) * 10.0);
+    }
+    near(marginal.residual, products[(last, last)], products[(last, last)]);
+    // The geometry beside effects of given size.
+    let coefficients: Vec<(usize, f64)> = columns.iter().map(|column| (*column, 0.7)).collect();
+    let effects = rest.columns(0, last) * DVector::from_element(last, 0.7);
+    let change = normal.solve(&(jacobian.transpose() * (rest.column(last) - effects)));
+    assert!((marginal.geometry(&coefficients) - &change).norm() < 1e-8 * change.norm().max(1.0));
+    // An effect more is worth what the pair is.
+    let evidence = super::Evidence { marginal: &marginal, candidates: &pass.candidates, noise: data.noise };
+    for extension in evidence
+        .extensions(&chosen[..1])
+        .iter()
+        .filter(|one| !super::evidence::one_signed(&pass.candidates.hypotheses[one.member.0]))
+        .step_by(37)
+    {
+        let pair = evidence.log_posterior(&[chosen[0], extension.member]);
+        near(extension.log_posterior, pair, pair.abs().max(1.0) * 1e3);
+    }
+    let singles = super::Singles::new(&arm, &sensor, &rows, &options).unwrap().evidence();
+    let best = singles.iter().max_by(|a, b| a.log_posterior.total_cmp(&b.log_posterior)).unwrap();
+    assert_eq!(pass.candidates.hypotheses[best.member.0].kind, Some(Kind::Backlash));
 }

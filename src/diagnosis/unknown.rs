@@ -1,7 +1,7 @@
 //! Whether something is left that no effect of the library explains.
 
 use super::Analysis;
-use super::claims::{NAMED, probability};
+use super::claims::NAMED;
 use super::outcome::{NoiseFloor, NoiseSource, Unknown};
 use super::sentence::whose;
 
@@ -12,7 +12,13 @@ const EXCESS: f64 = 2.4;
 
 /// What is unknown: shapes without a name, structure, or too much. `level`: mean square of the residual over the declared one.
 pub(super) fn unknown(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFloor) -> Unknown {
-    let of_nameless = probability(analysis, |hypothesis| analysis.candidates.hypotheses[hypothesis].kind.is_none());
+    let of_nameless = analysis
+        .found
+        .claims
+        .iter()
+        .filter(|belief| belief.claim.0.is_none())
+        .map(|belief| belief.probability)
+        .fold(0.0, f64::max);
     let p_value = analysis.structure.p_value;
     let structured = p_value < STRUCTURED;
     // A sensor may be somewhat worse than it says, not this much.
@@ -22,9 +28,9 @@ pub(super) fn unknown(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFl
     let scatters = !analysis.scatter.is_empty();
     let present = of_nameless >= NAMED || structured || excess || scatters;
     let r#where = present.then(|| {
-        let members = analysis.found.best.members.iter().map(|(hypothesis, _)| &analysis.candidates.hypotheses[*hypothesis]);
+        let members = analysis.found.best.iter().map(|(hypothesis, _)| &analysis.evidence.candidates.hypotheses[*hypothesis]);
         let mut said: Vec<String> = members.filter(|of| of.kind.is_none()).map(|of| of.detail.clone()).collect();
-        said.extend(analysis.scatter.iter().map(|one| one.detail(level, analysis.rows.mechanism.slides[one.joint])));
+        said.extend(analysis.scatter.iter().map(|one| one.detail(level, analysis.linear.rows.mechanism.slides[one.joint])));
         if structured {
             said.push(analysis.structure.r#where.clone());
         }

@@ -5,7 +5,6 @@ use super::advice::next;
 use super::claims::{NAMED, SURE};
 use super::confusion::confusion;
 use super::detectability::detectability;
-use super::evidence::fit;
 use super::gap::Closing;
 use super::naming::name;
 use super::notes::notes;
@@ -20,13 +19,12 @@ const ENOUGH: f64 = 0.5;
 /// Puts the analysis into words and numbers.
 pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
     let noise_floor = noise_floor(analysis);
-    let best = fit(analysis.surviving, analysis.candidates, analysis.noise, &analysis.found.best.members);
-    let level = best.map_or(1.0, |fit| fit.noise);
+    let level = analysis.evidence.noise_level(&analysis.found.best);
     let closing = Closing::new(analysis, noise_floor.position_m);
     let gap = closing.gap();
     let unknown = unknown(analysis, level, &noise_floor);
     let named = name(analysis, &closing, unknown.present);
-    let confusion_sets = confusion(analysis, &named.of_member);
+    let confusion_sets = confusion(analysis);
     let power = detectability(analysis, level);
     let notes = notes(analysis, level, &noise_floor, &gap);
     let verdict = decide(&unknown, &named.effects, &confusion_sets, power.share);
@@ -57,7 +55,7 @@ fn noise_floor(analysis: &Analysis<'_>) -> NoiseFloor {
     // In the same proportion to that of the positions as what is left of them.
     let proportion = position_m / analysis.sigma_m();
     let rotation_rad =
-        analysis.sensor.orientation_sigma_rad.filter(|_| analysis.rows.per_row == 6).map(|sigma| sigma * proportion);
+        analysis.sensor.orientation_sigma_rad.filter(|_| analysis.linear.rows.per_row == 6).map(|sigma| sigma * proportion);
     NoiseFloor { position_m, rotation_rad, source }
 }
 

@@ -102,6 +102,17 @@ impl Whitening {
         DVector::from_vec(values)
     }
 
+    /// Whitens the equations of one row in place.
+    pub fn apply(&self, row: usize, values: &mut [f64]) {
+        match self.blocks.get(row) {
+            Some(block) => {
+                let whitened = block * DVectorView::from_slice(values, values.len());
+                values.copy_from_slice(whitened.as_slice());
+            }
+            None => values.iter_mut().enumerate().for_each(|(at, value)| *value *= self.diagonal[row * self.per_row + at]),
+        }
+    }
+
     /// The equations of one row, whitened.
     #[must_use]
     pub fn of_row(&self, row: usize, values: DVectorView<'_, f64>) -> DVector<f64> {

@@ -1,0 +1,118 @@
+//! The readings about the fitted geometry and the effects found so far: what geometry and any effects leave of them.
+
+use nalgebra::{DVector, DVectorView};
+
+use super::evidence::Candidates;
+use super::products::{GeometryPrior, Products};
+use super::rows::Rows;
+use crate::effects::signature::shape::{Displacement, Reading};
+
+/// A linear problem: rows, what may be in them, and what is measured minus what geometry alone predicts.
+#[derive(Clone, Debug)]
+pub struct Linear<'a> {
+    /// Geometry fitted beside the effects found so far.
+    pub rows: &'a Rows,
+    /// The readings as signatures see them.
+    pub readings: &'a [Reading],
+    /// What may be there.
+    pub candidates: &'a Candidates,
+    /// Residual as it is with no effect taken out, m and rad.
+    pub residual: DVector<f64>,
+    /// What is known of the geometry.
+    pub prior: GeometryPrior,
+}
+
+impl<'a> Linear<'a> {
+    /// `displacement`: what the effects that were taken out before the fit of `rows` do to the target of each row; empty for nothing.
+    #[must_use]
+    pub fn new(
+        rows: &'a Rows,
+        readings: &'a [Reading],
+        candidates: &'a Candidates,
+        displacement: &[Displacement],
+        scale: f64,
+    ) -> Linear<'a> {
+        let mut residual = rows.residual.clone();
+        for (row, displacement) in displacement.iter().enumerate() {
+            for equation in 0..rows.per_row {
+                residual[row * rows.per_row + equation] += displacement[equation];
+            }
+        }
+        let offset = DVector::from_fn(rows.jacobian.ncols(), |at, _| if rows.free[at] { 0.0 } else { rows.parameters[at] });
+        let prior = GeometryPrior { offset, free: rows.free.clone(), scale };
+        Linear { rows, readings, candidates, residual, prior }
+    }
+
+    /// Inner products by fold.
+    #[must_use]
+    pub fn products(&self, fold: &[usize], folds: usize) -> Products {
+        Products::new(self.rows, self.readings, self.candidates, &self.residual, fold, folds)
+    }
+
+    /// Rows.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.readings.len()
+    }
+
+    /// What the signatures with these coefficients (column and value) do to each equation, m and rad.
+    #[must_use]
+    pub fn made(&self, coefficients: &[(usize, f64)]) -> DVector<f64> {
+        let per_row = self.rows.per_row;
+        let mut made = DVector::zeros(self.residual.len());
+        for (hypothesis, of) in self.candidates.hypotheses.iter().enumerate() {
+            let columns = self.candidates.columns(hypothesis);
+            let values: Vec<(usize, f64)> = coefficients
+                .iter()
+                .filter(|(column, value)| columns.contains(column) && *value != 0.0)
+                .map(|(column, value)| (column - columns.start, *value))
+                .collect();
+            if values.is_empty() {
+                continue;
+            }
+            for (row, reading) in self.readings.iter().enumerate() {
+                let moved = of.shape.columns(reading, per_row == 6);
+                for (at, value) in &values {
+                    let factor = value * self.candidates.unit[hypothesis] * of.spread[*at];
+                    for equation in 0..per_row {
+                        made[row * per_row + equation] += moved[*at][equation] * factor;
+                    }
+                }
+            }
+        }
+        made
+    }
+
+    /// What is left with the geometry changed by `geometry` and with effects that do `made`, m and rad.
+    #[must_use]
+    pub fn left(&self, geometry: &DVector<f64>, made: &DVector<f64>) -> DVector<f64> {
+        &self.residual - &self.rows.jacobian * geometry - made
+    }
+
+    /// The sum of squares of the positions of `rows` (m²) with the geometry changed by `geometry` and with effects that do `made`.
+    #[must_use]
+    pub fn squares(&self, rows: &[usize], geometry: &DVector<f64>, made: &DVector<f64>) -> f64 {
+        let per_row = self.rows.per_row;
+        let mut sum = 0.0;
+        for row in rows {
+            for equation in row * per_row..row * per_row + 3 {
+                let moved = self.rows.jacobian.row(equation).iter().zip(geometry.iter()).map(|(a, b)| a * b).sum::<f64>();
+                let left = self.residual[equation] - moved - made[equation];
+                sum += left * left;
+            }
+        }
+        sum
+    }
+
+    /// `values` (m, rad) in sigmas, times the root of each row's weight.
+    #[must_use]
+    pub fn in_sigmas(&self, values: &DVector<f64>) -> DVector<f64> {
+        self.rows.whitening.of_vector(values)
+    }
+
+    /// The equations of one row.
+    #[must_use]
+    pub fn of_row<'v>(&self, values: &'v DVector<f64>, row: usize) -> DVectorView<'v, f64> {
+        values.rows(row * self.rows.per_row, self.rows.per_row)
+    }
+}

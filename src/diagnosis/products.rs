@@ -1,0 +1,408 @@
+//! Inner products of residuals, geometry and signatures: all that evidence needs. They add over the folds of a cross-validation, so that
+//! leaving a fold out is a subtraction, and those between signatures are made when they are asked for: a search looks at the few
+//! signatures that it has chosen against all others, never at all against all.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::{Arc, RwLock};
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::evidence::Candidates;
+use super::rows::Rows;
+use crate::effects::signature::shape::Reading;
+
+/// Inner products of `[geometry | signatures | residual]`, fold by fold.
+#[derive(Debug)]
+pub struct Products {
+    folds: Vec<Fold>,
+    geometry: usize,
+    /// Columns of each hypothesis.
+    columns: Vec<Range<usize>>,
+    /// First entry of each hypothesis among the products of its own columns.
+    first_own: Vec<usize>,
+    /// Of a signature's column with all columns, fold by fold: as far as it has been asked for.
+    rows: RwLock<BTreeMap<usize, Arc<Vec<f64>>>>,
+}
+
+/// The rows of one fold.
+#[derive(Debug)]
+struct Fold {
+    /// Whitened signatures.
+    signatures: DMatrix<f64>,
+    /// Of the geometry.
+    normal: DMatrix<f64>,
+    /// Of the geometry with signatures and, last, the residual.
+    mixed: DMatrix<f64>,
+    /// Of the columns of each hypothesis with each other.
+    own: Vec<f64>,
+    with_residual: Vec<f64>,
+    residual: f64,
+    equations: f64,
+}
+
+/// Sum of products, in an order that does not depend on the processor.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (blocks_a, blocks_b) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = blocks_a.remainder().iter().zip(blocks_b.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in blocks_a.zip(blocks_b) {
+        for lane in 0..8 {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7])) + rest
+}
+
+fn column(matrix: &DMatrix<f64>, number: usize) -> &[f64] {
+    let rows = matrix.nrows();
+    &matrix.as_slice()[number * rows..(number + 1) * rows]
+}
+
+impl Products {
+    /// Of the signatures of `candidates` at `readings`, of the geometry of `rows`, and of `residual` (m and rad, as it is without any
+    /// effect taken out). `fold`: of each row; there are `folds` of them.
+    #[must_use]
+    pub fn new(
+        rows: &Rows,
+        readings: &[Reading],
+        candidates: &Candidates,
+        residual: &DVector<f64>,
+        fold: &[usize],
+        folds: usize,
+    ) -> Products {
+        use rayon::prelude::*;
+        let columns: Vec<Range<usize>> = (0..candidates.hypotheses.len()).map(|number| candidates.columns(number)).collect();
+        let mut first_own = Vec::with_capacity(columns.len());
+        let mut entries = 0;
+        for columns in &columns {
+            first_own.push(entries);
+            entries += columns.len() * columns.len();
+        }
+        let of_fold = |number: usize| {
+            let own_rows: Vec<usize> = (0..fold.len()).filter(|row| fold[*row] == number).collect();
+            Fold::new(rows, readings, candidates, residual, &own_rows, &columns)
+        };
+        let folds: Vec<Fold> = (0..folds).into_par_iter().map(of_fold).collect();
+        Products { folds, geometry: rows.jacobian.ncols(), columns, first_own, rows: RwLock::default() }
+    }
+
+    /// Number of folds.
+    #[must_use]
+    pub fn folds(&self) -> usize {
+        self.folds.len()
+    }
+
+    fn width(&self) -> usize {
+        self.columns.last().map_or(0, |last| last.end)
+    }
+
+    /// Products of column `number` with every column: as many numbers per fold as there are columns.
+    fn of_column(&self, number: usize) -> Arc<Vec<f64>> {
+        if let Ok(known) = self.rows.read()
+            && let Some(row) = known.get(&number)
+        {
+            return Arc::clone(row);
+        }
+        let width = self.width();
+        let mut row = Vec::with_capacity(width * self.folds.len());
+        for fold in &self.folds {
+            let own = column(&fold.signatures, number);
+            row.extend((0..width).map(|other| dot(own, column(&fold.signatures, other))));
+        }
+        let row = Arc::new(row);
+        if let Ok(mut known) = self.rows.write() {
+            known.insert(number, Arc::clone(&row));
+        }
+        row
+    }
+}
+
+impl Fold {
+    fn new(
+        rows: &Rows,
+        readings: &[Reading],
+        candidates: &Candidates,
+        residual: &DVector<f64>,
+        own_rows: &[usize],
+        columns: &[Range<usize>],
+    ) -> Fold {
+        let per_row = rows.per_row;
+        let (geometry, width) = (rows.jacobian.ncols(), columns.last().map_or(0, |last| last.end));
+        let equations = own_rows.len() * per_row;
+        let mut jacobian = DMatrix::zeros(equations, geometry);
+        let mut signatures = DMatrix::zeros(equations, width);
+        let mut left = vec![0.0; equations];
+        let mut values = vec![0.0; per_row];
+        for (at, row) in own_rows.iter().enumerate() {
+            let (from, to) = (row * per_row, at * per_row);
+            for parameter in 0..geometry {
+                values.iter_mut().enumerate().for_each(|(i, value)| *value = rows.jacobian[(from + i, parameter)]);
+                rows.whitening.apply(*row, &mut values);
+                values.iter().enumerate().for_each(|(i, value)| jacobian[(to + i, parameter)] = *value);
+            }
+            for (hypothesis, of) in candidates.hypotheses.iter().enumerate() {
+                let unit = candidates.unit[hypothesis];
+                for (i, moved) in of.shape.columns(&readings[*row], per_row == 6).iter().enumerate() {
+                    let factor = unit * of.spread[i];
+                    values.iter_mut().zip(moved).for_each(|(value, moved)| *value = moved * factor);
+                    rows.whitening.apply(*row, &mut values);
+                    let number = columns[hypothesis].start + i;
+                    values.iter().enumerate().for_each(|(i, value)| signatures[(to + i, number)] = *value);
+                }
+            }
+            values.iter_mut().enumerate().for_each(|(i, value)| *value = residual[from + i]);
+            rows.whitening.apply(*row, &mut values);
+            left[to..to + per_row].copy_from_slice(&values);
+        }
+        let normal =
+            DMatrix::from_fn(
+                geometry,
+                geometry,
+                |i, j| {
+                    if i < j { 0.0 } else { dot(column(&jacobian, i), column(&jacobian, j)) }
+                },
+            );
+        let normal = DMatrix::from_fn(geometry, geometry, |i, j| normal[(i.max(j), i.min(j))]);
+        let mixed = DMatrix::from_fn(geometry, width + 1, |parameter, other| {
+            let with = if other < width { column(&signatures, other) } else { left.as_slice() };
+            dot(column(&jacobian, parameter), with)
+        });
+        let own = columns
+            .iter()
+            .flat_map(|of| of.clone().flat_map(move |a| of.clone().map(move |b| (a, b))))
+            .map(|(a, b)| dot(column(&signatures, a), column(&signatures, b)))
+            .collect();
+        let with_residual = (0..width).map(|number| dot(column(&signatures, number), &left)).collect();
+        // A row that counts half is half an equation.
+        let weight: f64 = own_rows.iter().map(|row| rows.whitening.weights()[*row]).sum();
+        Fold { residual: dot(&left, &left), signatures, normal, mixed, own, with_residual, equations: per_row as f64 * weight }
+    }
+}
+
+/// What is known of the geometry before the readings: the fitted values over the sigmas of their priors (zero where free), and by how
+/// much those sigmas are too large (one: as they are).
+#[derive(Clone, Debug, PartialEq)]
+pub struct GeometryPrior {
+    /// Fitted values over sigma.
+    pub offset: DVector<f64>,
+    /// Which parameters are free.
+    pub free: Vec<bool>,
+    /// Sigma over that of the fit.
+    pub scale: f64,
+}
+
+impl GeometryPrior {
+    fn precision(&self, parameter: usize) -> f64 {
+        if self.free[parameter] { 1.0 } else { 1.0 / (self.scale * self.scale) }
+    }
+
+    /// The same with another scale.
+    #[must_use]
+    pub fn scaled(&self, scale: f64) -> GeometryPrior {
+        GeometryPrior { scale, ..self.clone() }
+    }
+}
+
+/// What is left once the geometry has been fitted jointly: inner products of what survives of signatures and residual.
+#[derive(Debug)]
+pub struct Marginal<'a> {
+    products: &'a Products,
+    left_out: Option<usize>,
+    /// Of geometry with signatures and residual, the prior's pull taken off the residual's.
+    mixed: DMatrix<f64>,
+    /// The geometry's change per unit of each signature and, last, of the residual.
+    absorbed: DMatrix<f64>,
+    /// Of geometry with itself, the priors' precisions added.
+    normal: DMatrix<f64>,
+    own: Vec<f64>,
+    /// Of signatures with the residual.
+    pub with_residual: Vec<f64>,
+    /// Of the residual with itself.
+    pub residual: f64,
+    /// Equations that the geometry leaves.
+    pub degrees_of_freedom: f64,
+    /// Logarithm of the evidence's part that the geometry's prior decides: half the log determinant of prior precision over posterior's.
+    pub log_geometry: f64,
+    rows: RwLock<BTreeMap<usize, Arc<Vec<f64>>>>,
+}
+
+impl<'a> Marginal<'a> {
+    /// Of all rows, or of all but those of the fold `left_out`. `None` where the rows do not tell where the arm stands.
+    #[must_use]
+    pub fn new(products: &'a Products, left_out: Option<usize>, prior: &GeometryPrior) -> Option<Marginal<'a>> {
+        let count = products.geometry;
+        let folds: Vec<&Fold> =
+            products.folds.iter().enumerate().filter(|(number, _)| Some(*number) != left_out).map(|(_, fold)| fold).collect();
+        let first = folds.first()?;
+        let (mut normal, mut mixed, mut own) = (first.normal.clone(), first.mixed.clone(), first.own.clone());
+        let (mut with_residual, mut residual, mut equations) = (first.with_residual.clone(), first.residual, first.equations);
+        for fold in &folds[1..] {
+            normal += &fold.normal;
+            mixed += &fold.mixed;
+            own.iter_mut().zip(&fold.own).for_each(|(sum, value)| *sum += value);
+            with_residual.iter_mut().zip(&fold.with_residual).for_each(|(sum, value)| *sum += value);
+            residual += fold.residual;
+            equations += fold.equations;
+        }
+        let last = mixed.ncols() - 1;
+        let mut log_geometry = 0.0;
+        for parameter in 0..count {
+            let (precision, offset) = (prior.precision(parameter), prior.offset[parameter]);
+            normal[(parameter, parameter)] += precision;
+            mixed[(parameter, last)] -= precision * offset;
+            residual += precision * offset * offset;
+            log_geometry += 0.5 * libm::log(precision);
+        }
+        let cholesky = Cholesky::new(normal.clone())?;
+        let absorbed = cholesky.solve(&mixed);
+        let inverse = cholesky.inverse();
+        let pinned: f64 = (0..count).map(|i| prior.precision(i) * inverse[(i, i)]).sum();
+        log_geometry -= (0..count).map(|i| libm::log(cholesky.l_dirty()[(i, i)])).sum::<f64>();
+        let taken = |a: usize, b: usize| dot(column(&mixed, a), column(&absorbed, b));
+        for (hypothesis, columns) in products.columns.iter().enumerate() {
+            let (first, width) = (products.first_own[hypothesis], columns.len());
+            for i in 0..width {
+                for j in 0..width {
+                    own[first + i * width + j] -= taken(columns.start + i, columns.start + j);
+                }
+            }
+        }
+        for (number, value) in with_residual.iter_mut().enumerate() {
+            *value -= taken(number, last);
+        }
+        let residual = (residual - taken(last, last)).max(1e-12);
+        Some(Marginal {
+            degrees_of_freedom: (equations - (count as f64 - pinned)).max(1.0),
+            products,
+            left_out,
+            mixed,
+            absorbed,
+            normal,
+            own,
+            with_residual,
+            residual,
+            log_geometry,
+            rows: RwLock::default(),
+        })
+    }
+
+    /// What survives of column `number` with every column.
+    #[must_use]
+    pub fn row(&self, number: usize) -> Arc<Vec<f64>> {
+        if let Ok(known) = self.rows.read()
+            && let Some(row) = known.get(&number)
+        {
+            return Arc::clone(row);
+        }
+        let width = self.products.width();
+        let by_fold = self.products.of_column(number);
+        let mut row = vec![0.0; width];
+        for (fold, values) in by_fold.chunks_exact(width.max(1)).enumerate() {
+            if Some(fold) != self.left_out {
+                row.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+            }
+        }
+        let mixed = column(&self.mixed, number);
+        for (other, value) in row.iter_mut().enumerate() {
+            *value -= dot(mixed, column(&self.absorbed, other));
+        }
+        let row = Arc::new(row);
+        if let Ok(mut known) = self.rows.write() {
+            known.insert(number, Arc::clone(&row));
+        }
+        row
+    }
+
+    /// What survives of columns `i` and `j` of `hypothesis`, counted from its first.
+    #[must_use]
+    pub fn own(&self, hypothesis: usize, i: usize, j: usize) -> f64 {
+        let width = self.products.columns[hypothesis].len();
+        self.own[self.products.first_own[hypothesis] + i * width + j]
+    }
+
+    /// Information about a coefficient of one of all columns of `hypothesis`: the trace of its block.
+    #[must_use]
+    pub fn information(&self, hypothesis: usize) -> f64 {
+        (0..self.products.columns[hypothesis].len()).map(|i| self.own(hypothesis, i, i)).sum()
+    }
+
+    /// Number of columns of all signatures.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.products.width()
+    }
+
+    /// The geometry's change beside signatures with these coefficients (column and value).
+    #[must_use]
+    pub fn geometry(&self, coefficients: &[(usize, f64)]) -> DVector<f64> {
+        let last = self.absorbed.ncols() - 1;
+        let mut change = self.absorbed.column(last).into_owned();
+        for (number, value) in coefficients {
+            change.axpy(-value, &self.absorbed.column(*number), 1.0);
+        }
+        change
+    }
+
+    /// The geometry's change per unit of column `number`.
+    #[must_use]
+    pub fn absorbed(&self, number: usize) -> DVector<f64> {
+        self.absorbed.column(number).into_owned()
+    }
+
+    /// The geometry's change where base and target are fitted and all else is nominal.
+    #[must_use]
+    pub fn free_only(&self, prior: &GeometryPrior) -> Option<DVector<f64>> {
+        let free: Vec<usize> = (0..self.products.geometry).filter(|parameter| prior.free[*parameter]).collect();
+        let last = self.mixed.ncols() - 1;
+        let normal = DMatrix::from_fn(free.len(), free.len(), |i, j| self.normal[(free[i], free[j])]);
+        // What is fitted of the frames is taken back, and with it what it does to the readings.
+        let right = DVector::from_fn(free.len(), |i, _| {
+            let back: f64 = (0..self.products.geometry).map(|j| self.normal[(free[i], j)] * prior.offset[j]).sum();
+            self.mixed[(free[i], last)] + back
+        });
+        let change = Cholesky::new(normal)?.solve(&right);
+        let mut all = -&prior.offset;
+        for (at, parameter) in free.iter().enumerate() {
+            all[*parameter] += change[at];
+        }
+        Some(all)
+    }
+}
+
+/// Products of made-up signatures without any geometry, for tests of what is made of them.
+#[cfg(test)]
+pub(super) struct TestProducts(Products);
+
+#[cfg(test)]
+impl TestProducts {
+    pub(super) fn marginal(&self) -> Marginal<'_> {
+        let prior = GeometryPrior { offset: DVector::zeros(0), free: Vec::new(), scale: 1.0 };
+        Marginal::new(&self.0, None, &prior).unwrap()
+    }
+}
+
+#[cfg(test)]
+pub(super) fn test_marginal(candidates: &Candidates, signatures: &DMatrix<f64>, residual: &DVector<f64>) -> TestProducts {
+    let columns: Vec<Range<usize>> = (0..candidates.hypotheses.len()).map(|number| candidates.columns(number)).collect();
+    let (mut first_own, mut own) = (Vec::new(), Vec::new());
+    for of in &columns {
+        first_own.push(own.len());
+        own.extend(
+            of.clone()
+                .flat_map(|a| of.clone().map(move |b| (a, b)))
+                .map(|(a, b)| signatures.column(a).dot(&signatures.column(b))),
+        );
+    }
+    let width = signatures.ncols();
+    let fold = Fold {
+        signatures: signatures.clone(),
+        normal: DMatrix::zeros(0, 0),
+        mixed: DMatrix::zeros(0, width + 1),
+        own,
+        with_residual: signatures.tr_mul(residual).as_slice().to_vec(),
+        residual: residual.norm_squared(),
+        equations: signatures.nrows() as f64,
+    };
+    TestProducts(Products { folds: vec![fold], geometry: 0, columns, first_own, rows: RwLock::default() })
+}
