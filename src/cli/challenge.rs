@@ -16,7 +16,6 @@ use crate::lab::challenge::folder::{self, COMMITMENT, MANIFEST, SEAL};
 use crate::lab::challenge::score::{self, closes, restorable};
 use crate::lab::challenge::verdict::{Diagnose, Gap, Verdict, nothing};
 use crate::lab::challenge::{CaseTruth, Folder, Options, TrueEffect, case};
-use crate::lab::injection::Sort;
 use crate::lab::reproduce::arms::arm8;
 use crate::lab::reproduce::bench::Watcher;
 use crate::recording::truth_file::write_whole;
@@ -147,34 +146,33 @@ fn new(global: &Global, options: &NewOptions) -> anyhow::Result<Outcome> {
 
 /// Names of effects to draw from: `known`, `foreign`, `all`, or kinds. Withheld ones are drawn as well.
 fn kinds(given: &[String], withheld: &[String]) -> anyhow::Result<Vec<String>> {
-    let mut sorts: Vec<Sort> = Vec::new();
-    let known = || Kind::ALL.into_iter().map(Sort::Known);
+    let mut kinds: Vec<Kind> = Vec::new();
     for name in given {
         match name.as_str() {
-            "known" => sorts.extend(known()),
-            "foreign" => sorts.extend(Sort::FOREIGN),
-            "all" => sorts.extend(Sort::all()),
-            name => sorts.push(Sort::from_name(name).with_context(|| {
-                let all: Vec<&str> = Sort::all().into_iter().map(Sort::name).collect();
+            "known" => kinds.extend(Kind::known()),
+            "foreign" => kinds.extend(Kind::foreign()),
+            "all" => kinds.extend(Kind::ALL),
+            name => kinds.push(Kind::from_name(name).with_context(|| {
+                let all: Vec<&str> = Kind::ALL.into_iter().map(Kind::name).collect();
                 format!("--kinds {name}: no such kind; there are known, foreign, all, {}", all.join(", "))
             })?),
         }
     }
     if given.is_empty() {
-        sorts.extend(known());
+        kinds.extend(Kind::known());
     }
-    sorts.extend(withheld.iter().filter_map(|name| Sort::from_name(name)));
-    sorts.sort_unstable();
-    sorts.dedup();
-    Ok(sorts.into_iter().map(|sort| sort.name().to_owned()).collect())
+    kinds.extend(withheld.iter().filter_map(|name| Kind::from_name(name)));
+    kinds.sort_unstable();
+    kinds.dedup();
+    Ok(kinds.into_iter().map(|kind| kind.name().to_owned()).collect())
 }
 
 fn withheld(given: &[String]) -> anyhow::Result<Vec<String>> {
     for name in given {
         ensure!(
-            Kind::from_name(name).is_some(),
+            Kind::known_from_name(name).is_some(),
             "--withheld {name}: no such kind; there are {}",
-            Kind::ALL.map(Kind::name).join(", ")
+            Kind::known().map(Kind::name).collect::<Vec<_>>().join(", ")
         );
     }
     Ok(given.to_vec())
@@ -337,7 +335,7 @@ fn told(
                 return Ok(None);
             }
             let case = folder.case(index)?;
-            let is = |effect: &TrueEffect| Some((Kind::from_name(&effect.kind)?, effect.location));
+            let is = |effect: &TrueEffect| Some((Kind::known_from_name(&effect.kind)?, effect.location));
             let only = truths[index].effects.iter().filter_map(is).collect();
             let found = diagnosed_among(&case, Some(only)).map_err(|why| anyhow::anyhow!("{}: {why}", case.path.display()))?;
             let found: Verdict = serde_json::from_value(found).context("the diagnosis is no verdict")?;

@@ -19,8 +19,8 @@ use crate::{report, scene, session};
 pub(crate) fn command(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Outcome> {
     let mut without = Vec::new();
     for name in &options.without {
-        let Some(kind) = Kind::from_name(name) else {
-            let known: Vec<&str> = Kind::ALL.iter().map(|kind| kind.name()).collect();
+        let Some(kind) = Kind::known_from_name(name) else {
+            let known: Vec<&str> = Kind::known().map(Kind::name).collect();
             bail!("--without {name}: no such kind; known are {}", known.join(", "));
         };
         without.push(kind);

@@ -12,7 +12,7 @@ use super::reproduce::Progress;
 use crate::arm::Arm;
 use crate::effects::Kind;
 use crate::lab::challenge::{case, power};
-use crate::lab::injection::Sort;
+use crate::lab::injection;
 use crate::recording::truth_file::write_whole;
 use crate::report;
 
@@ -71,14 +71,14 @@ fn what(given: &[String], arm: &Arm) -> anyhow::Result<Vec<(Kind, Option<usize>)
         .iter()
         .map(|text| {
             let (name, index) = text.split_once(':').map_or((text.as_str(), None), |(name, index)| (name, Some(index)));
-            let kind = Kind::from_name(name).filter(|kind| *kind != Kind::MeasurementOutliers).with_context(|| {
-                let names = Kind::ALL.into_iter().filter(|kind| *kind != Kind::MeasurementOutliers).map(Kind::name);
+            let kind = Kind::known_from_name(name).filter(|kind| *kind != Kind::MeasurementOutliers).with_context(|| {
+                let names = Kind::known().filter(|kind| *kind != Kind::MeasurementOutliers).map(Kind::name);
                 format!(
                     "--kinds {text}: no such kind with a magnitude that is stated; there are {}",
                     names.collect::<Vec<_>>().join(", ")
                 )
             })?;
-            let places = Sort::Known(kind).places(arm);
+            let places = injection::places(kind, arm);
             let place = index
                 .map(|index| {
                     let number = index.parse::<usize>().ok().and_then(|number| number.checked_sub(1));

@@ -13,8 +13,9 @@ use super::output;
 use super::reproduce::Progress;
 use crate::arm::Arm;
 use crate::design::problem::Method;
+use crate::effects::Kind;
 use crate::effects::Level;
-use crate::lab::injection::{Sort, magnitudes, written};
+use crate::lab::injection::{self, magnitudes, written};
 use crate::lab::sweep::grid::{COURSES, Injecting, SCENES_COURSE};
 use crate::lab::sweep::results::{Reader, merge};
 use crate::lab::sweep::{Background, CellSummary, Grid, Header, Reduction, Results, Sweep};
@@ -273,16 +274,16 @@ impl Axes {
         }
         let mut effects: Vec<Injecting> = Vec::new();
         for name in &self.effect {
-            let sort = Sort::from_name(name).with_context(|| {
+            let kind = Kind::from_name(name).with_context(|| {
                 format!(
                     "effect {name}: no such effect; there are {}",
-                    Sort::all().into_iter().map(Sort::name).collect::<Vec<_>>().join(", ")
+                    Kind::ALL.into_iter().map(Kind::name).collect::<Vec<_>>().join(", ")
                 )
             })?;
-            let places = places(sort, &self.at, arm)?;
-            let [low, high] = sort.range(places[0], arm);
+            let places = places(kind, &self.at, arm)?;
+            let [low, high] = kind.range(places[0], arm.joint_count());
             let values = match &self.magnitudes {
-                Some(text) => magnitudes(text, sort).map_err(|why| anyhow::anyhow!("magnitudes {text}: {why}"))?,
+                Some(text) => magnitudes(text, kind).map_err(|why| anyhow::anyhow!("magnitudes {text}: {why}"))?,
                 None => vec![0.0, low, (low * high).sqrt(), high],
             };
             for value in &values {
@@ -290,12 +291,12 @@ impl Axes {
                     *value <= ABSURD * high,
                     "magnitudes: {} of {name} is no fault but another machine; realistic are {} to {}, and up to {ABSURD} times that is \
                      taken",
-                    written(*value, sort),
-                    written(low, sort),
-                    written(high, sort)
+                    written(*value, kind),
+                    written(low, kind),
+                    written(high, kind)
                 );
             }
-            for injecting in Injecting::all(sort, &places, &values) {
+            for injecting in Injecting::all(kind, &places, &values) {
                 if !effects.contains(&injecting) {
                     effects.push(injecting);
                 }
@@ -325,12 +326,12 @@ fn named<T: serde::de::DeserializeOwned + Clone>(
 }
 
 /// Places (from 0) by names or numbers from 1; all if none is given.
-fn places(sort: Sort, given: &[String], arm: &Arm) -> anyhow::Result<Vec<Option<usize>>> {
-    let possible = sort.places(arm);
+fn places(kind: Kind, given: &[String], arm: &Arm) -> anyhow::Result<Vec<Option<usize>>> {
+    let possible = injection::places(kind, arm);
     if given.is_empty() || given.iter().any(|name| name == "all") || possible == [None] {
         return Ok(possible);
     }
-    let name = |place: usize| match sort.level() {
+    let name = |place: usize| match kind.level() {
         Level::Link => arm.links[place + 1].name.as_str(),
         _ => arm.chain.joints[place].name.as_str(),
     };
@@ -341,7 +342,7 @@ fn places(sort: Sort, given: &[String], arm: &Arm) -> anyhow::Result<Vec<Option<
             let found = possible.iter().flatten().find(|place| name(**place) == text || number == Some(**place + 1));
             found.map(|place| Some(*place)).with_context(|| {
                 let names: Vec<&str> = possible.iter().flatten().map(|place| name(*place)).collect();
-                format!("at {text}: {} cannot sit there; this arm has {}", sort.name(), names.join(", "))
+                format!("at {text}: {} cannot sit there; this arm has {}", kind.name(), names.join(", "))
             })
         })
         .collect()

@@ -19,23 +19,23 @@ pub(super) fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], power: &Det
     };
     let columns = &analysis.conditions.columns;
     for set in sets {
-        let has = |name: &str| set.iter().any(|one| one.kind == name);
-        if has("joint_compliance") && has("link_bending") {
+        let has = |kind: Kind| set.iter().any(|one| one.kind == Some(kind));
+        if has(Kind::JointCompliance) && has(Kind::LinkBending) {
             say("compliance or bending: load the arm sideways, tilt the base, or put a target on a link in between");
         }
-        if (has("link_bending") && has("tilt_clearance")) || has("joint_compliance") || has("gravity_lost_motion") {
+        if (has(Kind::LinkBending) && has(Kind::TiltClearance)) || has(Kind::JointCompliance) || has(Kind::GravityLostMotion) {
             say(PAYLOADS);
         }
-        if has("link_thermal_growth") || has("joint_thermal_drift") || has("base_drift") {
+        if has(Kind::LinkThermalGrowth) || has(Kind::JointThermalDrift) || has(Kind::BaseDrift) {
             say("temperature or time: heat and cool in one session, so that temperatures return while time goes on");
         }
-        if has("joint_eccentricity") || has("gear_coupling") {
+        if has(Kind::JointEccentricity) || has(Kind::GearCoupling) {
             say("harmonics of a joint: move it through its whole travel, other joints at rest");
         }
-        if has("base_step") || has("tool_step") {
+        if has(Kind::BaseStep) || has(Kind::ToolStep) {
             say("base or tool: read the same few configurations again with another orientation of the tool");
         }
-        if has("unknown") {
+        if set.iter().any(|one| one.kind.is_none()) {
             say("a shape without a name: more configurations where it shows");
         }
     }
@@ -48,7 +48,7 @@ pub(super) fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], power: &Det
     }
     // What these readings could not have shown, whatever they did show.
     let places = |kind: Kind| -> Vec<String> {
-        let of_kind = power.undetectable.iter().filter(|one| one.kind == kind.name() && one.minimum_detectable.value.is_none());
+        let of_kind = power.undetectable.iter().filter(|one| one.kind == kind && one.minimum_detectable.value.is_none());
         of_kind.filter_map(|one| one.location.index).map(|index| index.to_string()).collect()
     };
     if !columns.approach {
@@ -65,7 +65,7 @@ pub(super) fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], power: &Det
         }
     }
     let thermal = [Kind::LinkThermalGrowth, Kind::JointThermalDrift];
-    if !power.detectable.iter().any(|one| thermal.iter().any(|kind| one.kind == kind.name())) {
+    if !power.detectable.iter().any(|one| thermal.iter().any(|kind| one.kind == *kind)) {
         let known = analysis.measurements.iter().any(|row| row.ambient_c.is_some() || !row.temperatures_c.is_empty());
         say(if known {
             "thermal effects could not show, for the temperature hardly changed: let the arm warm up and cool down in one session"

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::evidence::Candidates;
 use crate::effects::Kind;
-use crate::effects::signature::library::{Hypothesis, RIPPLES};
-use crate::effects::signature::shape::Shape;
+use crate::effects::signature::library::Hypothesis;
+use crate::effects::signature::shape::Family;
 
 /// Prior odds of one effect more.
 const ODDS: f64 = 1.0;
@@ -27,30 +27,14 @@ pub(super) fn candidates(hypotheses: Vec<Hypothesis>) -> Candidates {
     Candidates { hypotheses, first, unit, log_odds: vec![0.0; count], active: vec![true; count] }
 }
 
-/// A class of hypotheses that share one prior.
-fn class(hypothesis: &Hypothesis) -> (Option<Kind>, u8) {
-    let shape = match hypothesis.shape {
-        _ if hypothesis.kind.is_some() => 0,
-        Shape::Harmonic(_, order) if order >= f64::from(*RIPPLES.start()) => 17,
-        Shape::Harmonic(..) => 1,
-        Shape::Bump { .. } => 2,
-        Shape::Crosstalk { .. } => 3,
-        Shape::Softening(_) | Shape::Hardening(_) => 4,
-        Shape::TorqueMemory(..) => 5,
-        Shape::DirectionLoad(_) => 6,
-        Shape::Memory(..) => 7,
-        Shape::AllYield => 8,
-        Shape::AngleCurve(_) => 10,
-        Shape::AngleMap { .. } => 11,
-        Shape::UnequalBend(_) => 12,
-        Shape::UnequalSeat(_) => 13,
-        Shape::RootAcross(_) => 14,
-        Shape::UnequalShift(_) => 15,
-        Shape::BaseCourse(_) => 16,
-        Shape::ToolCourse(_) => 18,
-        _ => 9,
-    };
-    (hypothesis.kind, shape)
+/// A class of hypotheses that share one prior: a kind, or a family of shapes without a name.
+type Class = (Option<Kind>, Option<Family>);
+
+fn class(hypothesis: &Hypothesis) -> Class {
+    match hypothesis.kind {
+        Some(kind) => (Some(kind), None),
+        None => (None, hypothesis.shape.unnamed().map(|(family, _)| family)),
+    }
 }
 
 /// Which hypotheses have information (`information`: of each, the trace of what survives of it), and their prior odds: equal for all kinds, for all places of a kind, for all variants at a
@@ -64,8 +48,8 @@ pub(super) fn weigh(candidates: &mut Candidates, information: &[f64]) {
     }
     let active: Vec<usize> = (0..count).filter(|number| candidates.active[*number]).collect();
     let hypotheses = &candidates.hypotheses;
-    let mut classes: [BTreeSet<(Option<Kind>, u8)>; 2] = Default::default();
-    let mut places: BTreeMap<(Option<Kind>, u8), BTreeMap<Option<usize>, usize>> = BTreeMap::new();
+    let mut classes: [BTreeSet<Class>; 2] = Default::default();
+    let mut places: BTreeMap<Class, BTreeMap<Option<usize>, usize>> = BTreeMap::new();
     let joints = hypotheses.iter().filter_map(|hypothesis| hypothesis.location.index).max().unwrap_or(1);
     for number in &active {
         let class = class(&hypotheses[*number]);
@@ -91,6 +75,6 @@ pub(super) fn weigh(candidates: &mut Candidates, information: &[f64]) {
 /// Logarithm of the prior odds that one of `joints` joints does what no hypothesis of `candidates` says: a class more of shapes without a name.
 pub(super) fn odds_of_one_more_nameless(candidates: &Candidates, joints: usize) -> f64 {
     let nameless = candidates.hypotheses.iter().zip(&candidates.active).filter(|(of, active)| **active && of.kind.is_none());
-    let classes: BTreeSet<u8> = nameless.map(|(of, _)| class(of).1).collect();
+    let classes: BTreeSet<Class> = nameless.map(|(of, _)| class(of)).collect();
     libm::log(ODDS * NAMELESS / ((classes.len() + 1) * joints) as f64)
 }

@@ -21,13 +21,13 @@ pub(super) fn claim(analysis: &Analysis<'_>, hypothesis: usize) -> Claim {
 pub(super) fn place(analysis: &Analysis<'_>, hypothesis: usize) -> Place {
     let of = &analysis.evidence.candidates.hypotheses[hypothesis];
     let time_s = match of.shape {
-        Shape::BaseStep(at) | Shape::ToolStep(at) => analysis.conditions.times.get(at).copied(),
+        Shape::BaseStep { row } | Shape::ToolStep { row } => analysis.conditions.times.get(row).copied(),
         _ => None,
     };
     Place { level: of.location.level, index: of.location.index, time_s }
 }
 
 /// The kind's name, or that it has none.
-pub(super) fn kind_name(kind: Option<Kind>) -> String {
-    kind.map_or_else(|| "unknown".to_owned(), |kind| kind.name().to_owned())
+pub(crate) fn kind_name(kind: Option<Kind>) -> &'static str {
+    kind.map_or("unknown", Kind::name)
 }

@@ -1,7 +1,7 @@
 //! What the data cannot tell apart.
 
 use super::Analysis;
-use super::claims::{NAMED, SURE, kind_name, place};
+use super::claims::{NAMED, SURE, place};
 use super::outcome::Candidate;
 
 /// A hypothesis of a set has at least this probability.
@@ -15,7 +15,7 @@ pub(super) fn confusion(analysis: &Analysis<'_>) -> Vec<Vec<Candidate>> {
             let worth = beliefs.iter().filter(|belief| belief.probability >= WORTH_SAYING);
             worth
                 .map(|belief| Candidate {
-                    kind: kind_name(belief.claim.0),
+                    kind: belief.claim.0,
                     location: place(analysis, belief.hypothesis),
                     probability: belief.probability,
                     detail: analysis.evidence.candidates.hypotheses[belief.hypothesis].detail.clone(),

@@ -42,12 +42,7 @@ pub(super) fn detectability(analysis: &Analysis<'_>, noise: f64) -> Detectabilit
         all += 1.0;
         let value = power.least.filter(|least| least.is_finite() && *least < 1e4 * largest);
         let least = MinimumDetectable { value, unit: kind.unit().to_owned() };
-        let entry = |reason: String| Undetectable {
-            kind: kind.name().to_owned(),
-            location: place,
-            minimum_detectable: least.clone(),
-            reason,
-        };
+        let entry = |reason: String| Undetectable { kind, location: place, minimum_detectable: least.clone(), reason };
         match value {
             Some(value) if value <= largest => {
                 seen += 1.0;
@@ -56,7 +51,7 @@ pub(super) fn detectability(analysis: &Analysis<'_>, noise: f64) -> Detectabilit
             Some(_) => {
                 let alike = power.alike.filter(|(_, likeness)| *likeness > 0.8).map(|(other, likeness)| {
                     let that = &candidates.hypotheses[other];
-                    let words = words(&kind_name(that.kind), &that.location);
+                    let words = words(kind_name(that.kind), &that.location);
                     format!("cannot be told from {words} (likeness {:.2}) at a realistic size", libm::sqrt(likeness))
                 });
                 let reason = alike.unwrap_or_else(|| "a realistic size is lost in the noise, or geometry absorbs it".to_owned());
@@ -71,7 +66,7 @@ pub(super) fn detectability(analysis: &Analysis<'_>, noise: f64) -> Detectabilit
         for joint in 1..=joints {
             all += 1.0;
             undetectable.push(Undetectable {
-                kind: kind.name().to_owned(),
+                kind,
                 location: Place { level: kind.level(), index: Some(joint), time_s: None },
                 minimum_detectable: MinimumDetectable { value: None, unit: kind.unit().to_owned() },
                 reason: reason.to_owned(),

@@ -6,7 +6,6 @@ use std::sync::Arc;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::products::Marginal;
-use crate::effects::Kind;
 use crate::effects::signature::library::Hypothesis;
 use crate::effects::signature::shape::Shape;
 
@@ -81,30 +80,17 @@ impl Candidates {
             return true;
         }
         let (a, b) = (&self.hypotheses[a], &self.hypotheses[b]);
+        let special_case = |of: &Hypothesis| of.shape.unnamed().and_then(|(_, kind)| kind);
         match (a.kind, b.kind) {
-            (Some(x), Some(y)) => x == y && a.location == b.location && !matches!(x, Kind::StrainWaveError | Kind::GearCoupling),
-            // Two bumps that overlap are one.
-            (None, None) if a.location == b.location && overlap(a, b) => true,
-            // What bends or seats a link unequally has the equal case in it.
-            (Some(Kind::LinkBending), None) | (None, Some(Kind::LinkBending)) => {
-                a.location.index == b.location.index
-                    && [a.shape, b.shape].iter().any(|shape| matches!(shape, Shape::UnequalBend(_)))
+            (Some(x), Some(y)) => x == y && a.location == b.location && !x.descriptor().may_repeat,
+            // What bends, seats or yields in another way has the named case in it.
+            (Some(kind), None) => a.location.index == b.location.index && special_case(b) == Some(kind),
+            (None, Some(kind)) => a.location.index == b.location.index && special_case(a) == Some(kind),
+            // Two bumps that overlap are one; so are two generalisations of one kind.
+            (None, None) => {
+                let alike = special_case(a).is_some() && special_case(a) == special_case(b);
+                a.location == b.location && (alike || overlap(a, b))
             }
-            (Some(Kind::TiltClearance), None) | (None, Some(Kind::TiltClearance)) => {
-                a.location.index == b.location.index
-                    && [a.shape, b.shape].iter().any(|shape| matches!(shape, Shape::UnequalSeat(_)))
-            }
-            (Some(Kind::RadialClearance), None) | (None, Some(Kind::RadialClearance)) => {
-                a.location.index == b.location.index
-                    && [a.shape, b.shape].iter().any(|shape| matches!(shape, Shape::UnequalShift(_)))
-            }
-            // A cubic spring has the linear one in it.
-            (Some(Kind::JointCompliance), None) | (None, Some(Kind::JointCompliance)) | (None, None) => {
-                a.location == b.location
-                    && (is_hardening(a) || is_hardening(b))
-                    && (a.kind != b.kind || is_hardening(a) == is_hardening(b))
-            }
-            _ => false,
         }
     }
 }
@@ -116,24 +102,10 @@ fn overlap(a: &Hypothesis, b: &Hypothesis) -> bool {
     }
 }
 
-fn is_hardening(hypothesis: &Hypothesis) -> bool {
-    matches!(hypothesis.shape, Shape::Hardening(_) | Shape::Softening(_))
-}
-
 /// Whether physics allows only one sign.
 #[must_use]
 pub fn one_signed(hypothesis: &Hypothesis) -> bool {
-    matches!(
-        hypothesis.kind,
-        Some(
-            Kind::JointCompliance
-                | Kind::LinkBending
-                | Kind::GravityLostMotion
-                | Kind::RadialClearance
-                | Kind::TiltClearance
-                | Kind::LinkThermalGrowth
-        )
-    )
+    hypothesis.kind.is_some_and(|kind| kind.descriptor().one_signed)
 }
 
 /// Members fitted together.

@@ -5,8 +5,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::Analysis;
 use super::evidence::{Fit, SCALES, one_signed};
 use super::outcome::Magnitude;
-use crate::effects::Kind;
-use crate::effects::signature::shape::Shape;
+use crate::effects::{Kind, Load};
 
 /// The best set fitted with the widest prior there is, so that it pulls next to nothing: what magnitudes and all else that effects have
 /// are told from.
@@ -21,12 +20,7 @@ pub(super) fn magnitude(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -
     let of = &analysis.evidence.candidates.hypotheses[hypothesis];
     let unit = analysis.evidence.candidates.unit[hypothesis];
     let columns = analysis.evidence.candidates.columns(hypothesis);
-    // Of a twist, the length of its translation.
-    let width = match of.shape {
-        Shape::BaseDrift | Shape::BaseStep(_) | Shape::ToolStep(_) => 3,
-        Shape::TwoHarmonics(_) => 2,
-        _ => columns.len(),
-    };
+    let width = of.shape.magnitude_width();
     let at: Vec<usize> = columns.take(width).filter_map(|column| fit.columns.iter().position(|known| *known == column)).collect();
     let value = |i: usize| fit.coefficients[at[i]] * unit * of.spread[i];
     let covariance = |i: usize, j: usize| fit.noise * fit.covariance[(at[i], at[j])] * unit * unit * of.spread[i] * of.spread[j];
@@ -34,7 +28,7 @@ pub(super) fn magnitude(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -
         (analysis.evidence.marginal.degrees_of_freedom + analysis.evidence.noise.degrees_of_freedom).max(1.0);
     let quantile = StudentsT::new(0.0, 1.0, degrees_of_freedom).map_or(1.96, |student| student.inverse_cdf(0.975));
     let name = of.kind.map_or("", Kind::unit).to_owned();
-    let load = matches!(of.kind, Some(Kind::JointCompliance | Kind::LinkBending)) && !analysis.linear.rows.mechanism.masses_known;
+    let load = is_driven_by_load(of.kind) && !analysis.linear.rows.mechanism.masses_known;
     let name = if load { "relative (no masses)".to_owned() } else { name };
     let model = model_sigma(of.kind);
     if width == 1 {
@@ -64,8 +58,9 @@ pub(super) fn magnitude(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -
 /// How well a signature is known, as a share of the magnitude (one sigma): what loads a joint hangs on levers that calibration cannot
 /// place to better than a millimetre or two in some tenths of a metre.
 fn model_sigma(kind: Option<Kind>) -> f64 {
-    match kind {
-        Some(Kind::JointCompliance | Kind::LinkBending) => 7e-3,
-        _ => 2e-3,
-    }
+    if is_driven_by_load(kind) { 7e-3 } else { 2e-3 }
+}
+
+fn is_driven_by_load(kind: Option<Kind>) -> bool {
+    kind.is_some_and(|kind| kind.descriptor().load == Load::Drives)
 }

@@ -23,7 +23,7 @@ mod notes;
 pub mod open_set;
 pub mod outcome;
 pub mod outliers;
-mod parameters;
+pub(crate) mod parameters;
 pub mod power;
 pub mod products;
 mod ripple;

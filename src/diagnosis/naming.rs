@@ -1,11 +1,11 @@
 //! What is named.
 
 use super::Analysis;
-use super::claims::{NAMED, claim, kind_name, place};
+use super::claims::{NAMED, claim, place};
 use super::gap::Closing;
 use super::magnitude::{magnitude, unpulled};
 use super::outcome::{Effect, Magnitude, Parameters, Place};
-use super::parameters::parameters;
+use super::parameters::{parameters, signature};
 use crate::effects::{Kind, Level};
 
 /// Effects that are named.
@@ -26,18 +26,20 @@ pub(super) fn name(analysis: &Analysis<'_>, closing: &Closing<'_>, unknown: bool
         let this = claim(analysis, *hypothesis);
         let of = &analysis.evidence.candidates.hypotheses[*hypothesis];
         let probability = analysis.found.probability(this);
-        let Some(fit) = unpulled.as_ref().filter(|_| of.kind.is_some() && probability >= NAMED) else {
+        let (Some(fit), Some(kind)) = (unpulled.as_ref().filter(|_| probability >= NAMED), of.kind) else {
             continue;
         };
         let chosen = folds.iter().filter(|fold| fold.chosen.iter().any(|other| claim(analysis, *other) == this)).count();
         let (before, now) = (closing.after(step), closing.after(step + 1));
         of_member[step] = Some(effects.len());
+        let signature = signature(analysis, fit, *hypothesis);
         effects.push(Effect {
-            kind: kind_name(of.kind),
+            kind,
             location: place(analysis, *hypothesis),
             probability,
             magnitude: magnitude(analysis, fit, *hypothesis),
-            parameters: parameters(analysis, fit, *hypothesis),
+            parameters: parameters(analysis, &signature),
+            signature: Some(signature),
             held_out_rms_before_m: before,
             held_out_rms_after_m: now,
             gap_closed: closing.closed(before, now),
@@ -59,11 +61,12 @@ fn outliers(analysis: &Analysis<'_>, closing: &Closing<'_>, unknown: bool) -> Op
     let scatters = !analysis.scatter.is_empty();
     let named = outliers.probability >= NAMED && outliers.factor >= enough && !is_left_out && !scatters;
     named.then(|| Effect {
-        kind: Kind::MeasurementOutliers.name().to_owned(),
+        kind: Kind::MeasurementOutliers,
         location: Place { level: Level::Sensor, index: None, time_s: None },
         probability: outliers.probability,
         magnitude: Magnitude { value: outliers.share, unit: "1".to_owned(), ci95: outliers.share_ci95 },
         parameters: Parameters { factor: Some(outliers.factor), ..Parameters::default() },
+        signature: None,
         held_out_rms_before_m: closing.explained(),
         held_out_rms_after_m: closing.explained(),
         gap_closed: None,

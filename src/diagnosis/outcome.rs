@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::held_out::Block;
-use crate::effects::Level;
+use crate::effects::signature::shape::{Displacement, Reading, Shape};
+use crate::effects::{Kind, Level};
 
 /// JSON Schema of [`Diagnosis`].
 pub const SCHEMA: &str = include_str!("schema.json");
@@ -196,11 +197,56 @@ pub struct Parameters {
     pub held: Option<f64>,
 }
 
+/// What a named effect was diagnosed to follow: true = reading + sum of coefficient times column.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Signature {
+    /// The shape that won, of all variants of its kind.
+    #[serde(flatten)]
+    pub shape: Shape,
+    /// Of each of its columns, SI.
+    pub coefficients: Vec<f64>,
+}
+
+impl Signature {
+    /// What it does to the target of `reading`: shift (m) and turn (rad), in root. `None` where the reading lacks what it follows.
+    /// `orientation`: whether orientations are measured.
+    #[must_use]
+    pub fn displacement(&self, reading: &Reading, orientation: bool) -> Option<Displacement> {
+        if !self.shape.can_be_read(reading) {
+            return None;
+        }
+        let columns = self.shape.columns(reading, orientation);
+        let of = |axis: usize| columns.iter().zip(&self.coefficients).map(|(column, value)| column[axis] * value).sum();
+        Some(std::array::from_fn(of))
+    }
+}
+
+/// A kind, or `unknown` for what has no name.
+mod kind_or_unknown {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    use crate::effects::Kind;
+
+    pub(super) const UNKNOWN: &str = "unknown";
+
+    pub(super) fn serialize<S: Serializer>(kind: &Option<Kind>, serializer: S) -> Result<S::Ok, S::Error> {
+        kind.map_or(UNKNOWN, Kind::name).serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Kind>, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        if name == UNKNOWN {
+            return Ok(None);
+        }
+        Kind::from_name(&name).map(Some).ok_or_else(|| serde::de::Error::custom(format!("no kind {name:?}")))
+    }
+}
+
 /// An effect that is named.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Effect {
     /// Kind.
-    pub kind: String,
+    pub kind: Kind,
     /// Where.
     pub location: Place,
     /// That it is there.
@@ -209,6 +255,9 @@ pub struct Effect {
     pub magnitude: Magnitude,
     /// What else it takes to make it happen.
     pub parameters: Parameters,
+    /// What it follows; absent for outliers, and in recordings that were made before it was kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub signature: Option<Signature>,
     /// 3-D RMS on held-out poses before it was added, m.
     pub held_out_rms_before_m: f64,
     /// And after.
@@ -224,8 +273,9 @@ pub struct Effect {
 /// A hypothesis of a set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Candidate {
-    /// Kind; `unknown` for a shape without a name.
-    pub kind: String,
+    /// Kind; `None` (written `unknown`) for a shape without a name.
+    #[serde(with = "kind_or_unknown")]
+    pub kind: Option<Kind>,
     /// Where.
     pub location: Place,
     /// That it is this one.
@@ -234,11 +284,19 @@ pub struct Candidate {
     pub detail: String,
 }
 
+impl Candidate {
+    /// Its kind's name, or `unknown`.
+    #[must_use]
+    pub fn kind_name(&self) -> &'static str {
+        self.kind.map_or(kind_or_unknown::UNKNOWN, Kind::name)
+    }
+}
+
 /// A hypothesis that this data set would show from some magnitude on, or not at all.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Undetectable {
     /// Kind.
-    pub kind: String,
+    pub kind: Kind,
     /// Where.
     pub location: Place,
     /// Smallest magnitude that would be named in four cases of five.

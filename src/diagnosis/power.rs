@@ -522,7 +522,7 @@ mod tests {
             share: None,
             kind,
             location: Location { level: crate::effects::Level::Joint, index: Some(joint) },
-            shape: Shape::Torque(joint),
+            shape: Shape::Torque { joint },
             range: [0.5, 2.0],
             spread: vec![if width == 2 { 0.7 } else { 1.0 }; width],
             detail: String::new(),

@@ -38,7 +38,7 @@ pub(super) fn scan(linear: &Linear<'_>, residual: &DVector<f64>, level: f64) -> 
     let lower = normal.l();
     let joints = readings.first().map_or(0, |reading| reading.joints.len());
     let known = |joint: usize, waves: u16| {
-        candidates.hypotheses.iter().any(|hypothesis| hypothesis.shape == Shape::Harmonic(joint, f64::from(waves)))
+        candidates.hypotheses.iter().any(|hypothesis| hypothesis.shape == Shape::Harmonic { joint, order: f64::from(waves) })
     };
     let mut found: Vec<Ripple> = (0..joints)
         .into_par_iter()

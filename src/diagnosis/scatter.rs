@@ -74,7 +74,7 @@ fn moved(mechanism: &Mechanism, posture: &Posture, target: &Vector3<f64>, per_ro
 /// Whether scatter may be mistaken for it: one of thousands of ripples and bumps.
 pub(super) fn is_contested(of: &Hypothesis) -> bool {
     of.kind == Some(Kind::StrainWaveError)
-        || matches!(of.shape, Shape::Harmonic(_, order) if order >= f64::from(*RIPPLES.start()))
+        || matches!(of.shape, Shape::Harmonic { order, .. } if order >= f64::from(*RIPPLES.start()))
         || matches!(of.shape, Shape::Bump { .. })
 }
 

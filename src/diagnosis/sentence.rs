@@ -3,7 +3,7 @@
 use super::claims::SURE;
 use super::detectability::Detectability;
 use super::outcome::{Candidate, Effect, Gap, NoiseSource, Place, Unknown, Verdict};
-use crate::effects::{Level, Location};
+use crate::effects::{Kind, Level, Location};
 
 /// The verdict in a sentence.
 pub(super) fn sentence(
@@ -18,7 +18,7 @@ pub(super) fn sentence(
         // Two ripples of one joint are one cause.
         let mut names: Vec<String> = Vec::new();
         for effect in effects {
-            let name = format!("{} ({:.0} %)", of_place(&effect.kind, &effect.location), 100.0 * effect.probability);
+            let name = format!("{} ({:.0} %)", of_place(effect.kind.name(), &effect.location), 100.0 * effect.probability);
             if !names.contains(&name) {
                 names.push(name);
             }
@@ -51,7 +51,7 @@ pub(super) fn sentence(
                 .into_iter()
                 .flatten()
                 .take(3)
-                .map(|one| format!("{} ({:.0} %)", of_place(&one.kind, &one.location), 100.0 * one.probability))
+                .map(|one| format!("{} ({:.0} %)", of_place(one.kind_name(), &one.location), 100.0 * one.probability))
                 .collect();
             if names(effects).len() > 1 {
                 format!(
@@ -80,9 +80,9 @@ pub(super) fn sentence(
 
 /// Kinds that would have shown at no place.
 fn nowhere(power: &Detectability) -> String {
-    let seen = |kind: &str| power.detectable.iter().any(|one| one.kind == kind);
+    let seen = |kind: Kind| power.detectable.iter().any(|one| one.kind == kind);
     let mut blind: Vec<String> =
-        power.undetectable.iter().filter(|one| !seen(&one.kind)).map(|one| one.kind.replace('_', " ")).collect();
+        power.undetectable.iter().filter(|one| !seen(one.kind)).map(|one| one.kind.name().replace('_', " ")).collect();
     blind.sort();
     blind.dedup();
     if blind.is_empty() { String::new() } else { format!(" Nowhere to be seen would have been: {}.", blind.join(", ")) }

@@ -138,7 +138,7 @@ fn backlash_and_compliance_are_named_with_place_and_size() {
     let found = diagnosed(&arm, &rows, Vec::new());
     assert_eq!(found.verdict, Verdict::Explained, "{}", found.sentence);
     assert_eq!(found.effects.len(), 2, "{}", found.sentence);
-    for (kind, index, size) in [("backlash", 3, width), ("joint_compliance", 4, compliance)] {
+    for (kind, index, size) in [(Kind::Backlash, 3, width), (Kind::JointCompliance, 4, compliance)] {
         let effect = found.effects.iter().find(|effect| effect.kind == kind).unwrap();
         assert_eq!(effect.location.index, Some(index));
         assert!((effect.magnitude.value / size - 1.0).abs() < 0.15, "{kind}: {} against {size}", effect.magnitude.value);

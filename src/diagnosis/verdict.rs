@@ -63,7 +63,7 @@ fn noise_floor(analysis: &Analysis<'_>) -> NoiseFloor {
 fn decide(unknown: &Unknown, effects: &[Effect], sets: &[Vec<Candidate>], share: f64) -> Verdict {
     // Sure, and the same for half of the folds at least.
     let settled = |effect: &&Effect| effect.probability >= SURE && 2 * effect.folds[0] >= effect.folds[1];
-    let named: Vec<&Effect> = effects.iter().filter(|effect| effect.kind != Kind::MeasurementOutliers.name()).collect();
+    let named: Vec<&Effect> = effects.iter().filter(|effect| effect.kind != Kind::MeasurementOutliers).collect();
     let open = sets.iter().any(|set| set.iter().map(|candidate| candidate.probability).sum::<f64>() >= NAMED);
     if unknown.present {
         Verdict::UnknownRemains

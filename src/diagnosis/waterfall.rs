@@ -9,8 +9,7 @@ use super::outliers;
 use super::rows::{self, DiagnosisError, Readings, Rows};
 use super::weights;
 use crate::arm::Arm;
-use crate::effects::Kind;
-use crate::effects::signature::shape::{Displacement, Shape};
+use crate::effects::signature::shape::Displacement;
 use crate::measurement::{Measurement, Sensor};
 
 /// Rounds of fitting geometry beside the effects, and of weighting readings.
@@ -75,26 +74,13 @@ impl<'a> Waterfall<'a> {
             .fold(nothing, |sum, one| sum.iter().zip(&one).map(|(a, b)| std::array::from_fn(|axis| a[axis] + b[axis])).collect())
     }
 
-    /// What `effect` does to the target in each reading (shift in m, turn in rad, in root), to first order; `None` where there is no
-    /// formula for it, or where the readings lack what it needs.
+    /// What `effect` does to the target in each reading (shift in m, turn in rad, in root), to first order: the columns of what it was
+    /// diagnosed to follow times their coefficients. `None` where it follows nothing (outliers), or where the readings lack what it needs.
     #[must_use]
     pub fn displacements(&self, effect: &Effect) -> Option<Vec<Displacement>> {
-        let (shape, values) = formula(effect, self.rows.mechanism.joint_count())?;
+        let signature = effect.signature.as_ref()?;
         let orientation = self.rows.per_row == 6;
-        let known = |joint: usize, values: &[f64]| joint < values.len();
-        self.conditions
-            .readings
-            .iter()
-            .map(|reading| {
-                match shape {
-                    Shape::Direction(joint) if !known(joint, &reading.approach) => return None,
-                    Shape::Warmth(_) | Shape::Growth(_) if reading.rise_k.is_empty() => return None,
-                    _ => {}
-                }
-                let columns = shape.columns(reading, orientation);
-                Some(std::array::from_fn(|axis| columns.iter().zip(&values).map(|(column, value)| column[axis] * value).sum()))
-            })
-            .collect()
+        self.conditions.readings.iter().map(|reading| signature.displacement(reading, orientation)).collect()
     }
 
     /// 3-D position RMS on held-out poses, m, of base, target and geometry fitted to what the readings are without `displacements`
@@ -124,35 +110,4 @@ impl<'a> Waterfall<'a> {
         let (sum, count) = squares.iter().fold((0.0, 0), |(sum, count), one| (sum + one.0, count + one.1));
         Ok(libm::sqrt(sum / count.max(1) as f64))
     }
-}
-
-/// What an effect follows, and the coefficients of its columns.
-fn formula(effect: &Effect, joints: usize) -> Option<(Shape, Vec<f64>)> {
-    let (parameters, size) = (&effect.parameters, effect.magnitude.value);
-    // Joints and links count from 0 in here.
-    let index = effect.location.index.and_then(|index| index.checked_sub(1)).filter(|index| *index < joints);
-    let twist = || Some([parameters.translation_m?, parameters.rotation_rad?].concat());
-    Some(match Kind::from_name(&effect.kind)? {
-        Kind::JointCompliance => (Shape::Torque(index?), vec![size]),
-        Kind::LinkBending => (Shape::MomentAcross(index?), vec![size]),
-        Kind::Backlash => (Shape::Direction(index?), vec![size * parameters.sign?]),
-        Kind::GravityLostMotion => (Shape::TorqueSign(index?), vec![size]),
-        Kind::JointEccentricity | Kind::StrainWaveError => {
-            let (sine, cosine) = libm::sincos(parameters.phase_rad?);
-            (Shape::Harmonic(index?, parameters.order?), vec![size * cosine, -size * sine])
-        }
-        Kind::GearCoupling => {
-            let source = parameters.source?.checked_sub(1).filter(|source| *source < joints)?;
-            (Shape::Ratio { joint: index?, source }, vec![size])
-        }
-        Kind::LinkThermalGrowth => (Shape::Growth(index), vec![size]),
-        Kind::JointThermalDrift => (Shape::Warmth(index?), vec![size]),
-        Kind::RadialClearance => (Shape::ForceAcrossSign { joint: index?, held: parameters.held? }, vec![size]),
-        Kind::TiltClearance => (Shape::MomentAcrossSign { joint: index?, held: parameters.held? }, vec![size]),
-        Kind::BaseDrift => (Shape::BaseDrift, twist()?),
-        Kind::BaseStep => (Shape::BaseStep(parameters.row?), twist()?),
-        Kind::ToolStep => (Shape::ToolStep(parameters.row?), twist()?),
-        Kind::MeasurementScale => (Shape::Scale, vec![size]),
-        Kind::MeasurementOutliers => return None,
-    })
 }

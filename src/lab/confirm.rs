@@ -13,13 +13,13 @@ use super::effect_validation::undecided;
 use crate::arm::Step as ChainStep;
 use crate::arm::frames::{Pose, rotation_vector};
 use crate::arm::{Arm, Inertial};
-use crate::diagnosis::outcome::{self, Diagnosis, Place, Verdict};
+use crate::diagnosis::outcome::{self, Diagnosis, Place, Signature, Verdict};
 use crate::diagnosis::rows::{DiagnosisError, Rows};
 use crate::diagnosis::waterfall::Waterfall;
-use crate::effects::Kind;
-use crate::effects::signature::shape::Displacement;
+use crate::effects::signature::shape::{Displacement, Shape};
+use crate::effects::{Kind, Load};
 use crate::measurement::{Measurement, Sensor};
-use crate::simulation::effect::{Effect, Moves};
+use crate::simulation::effect::{Effect, Foot, Growing, Moves};
 use crate::simulation::physics::{Conditions, PhysicalArm, PhysicsError, Settling, Stop};
 use crate::units::micrometres as um;
 
@@ -76,7 +76,7 @@ pub enum Answer {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Step {
     /// Kind.
-    pub kind: String,
+    pub kind: Kind,
     /// Where.
     pub location: Place,
     /// Whether the physics made it happen; where not, its formula stands in for it in all steps.
@@ -156,7 +156,7 @@ pub fn confirm(
         let own = formula.unwrap_or(&nothing);
         analytic = added(&analytic, own);
         let mut step = Step {
-            kind: effect.kind.clone(),
+            kind: effect.kind,
             location: effect.location,
             simulated: false,
             reason: String::new(),
@@ -169,8 +169,8 @@ pub fn confirm(
             physics_rms_m: 0.0,
             disagreement: String::new(),
         };
-        let ran = scene_effect(effect, &waterfall.rows).and_then(|physical| {
-            let all: Vec<Effect> = simulated.iter().cloned().chain([physical]).collect();
+        let ran = simulated_as(effect, waterfall.rows.mechanism.masses_known).and_then(|physical| {
+            let all: Vec<Effect> = simulated.iter().cloned().chain(physical).collect();
             let ran = simulator.run(&all).map_err(|error| error.to_string())?;
             Ok((all, ran))
         });
@@ -245,8 +245,8 @@ fn disagreement(step: &Step, noise_rms_m: f64, held: usize) -> String {
 
 fn answer(steps: &[Step]) -> (Answer, String) {
     let name = |step: &Step| match step.location.index {
-        Some(index) => format!("{} {index}", step.kind),
-        None => step.kind.clone(),
+        Some(index) => format!("{} {index}", step.kind.name()),
+        None => step.kind.name().to_owned(),
     };
     let left: Vec<String> =
         steps.iter().filter(|step| !step.simulated).map(|step| format!("{} ({})", name(step), step.reason)).collect();
@@ -291,68 +291,97 @@ fn rms(displacements: &[Displacement]) -> f64 {
     libm::sqrt(squares / displacements.len().max(1) as f64)
 }
 
-/// What the physics must be told to make `effect` happen; in words, why it cannot.
-fn scene_effect(effect: &outcome::Effect, rows: &Rows) -> Result<Effect, String> {
-    let (parameters, size) = (&effect.parameters, effect.magnitude.value);
-    let kind = Kind::from_name(&effect.kind).ok_or_else(|| format!("no kind {}", effect.kind))?;
-    let driven_by_load = matches!(
-        kind,
-        Kind::JointCompliance | Kind::LinkBending | Kind::GravityLostMotion | Kind::RadialClearance | Kind::TiltClearance
-    );
-    if driven_by_load && !rows.mechanism.masses_known {
+/// What the physics must be told to make `effect` happen as it was diagnosed; in words, why it cannot.
+fn simulated_as(effect: &outcome::Effect, masses_known: bool) -> Result<Vec<Effect>, String> {
+    let Some(Signature { shape, coefficients }) = &effect.signature else {
+        return Err(match effect.kind {
+            Kind::MeasurementOutliers => "noise of the sensor: it moves nothing, and is weighted down".to_owned(),
+            _ => "the diagnosis does not keep what it follows".to_owned(),
+        });
+    };
+    if effect.kind.descriptor().load != Load::None && !masses_known {
         return Err("gravity drives it, and the robot's file has no masses: give a URDF with inertials".to_owned());
     }
-    let joints = rows.mechanism.joint_count();
-    // From 0 in the physics.
-    let place = effect.location.index.and_then(|index| index.checked_sub(1)).filter(|index| *index < joints);
-    let at = || place.ok_or_else(|| "the diagnosis does not say where".to_owned());
-    let told = |value: Option<f64>| value.ok_or_else(|| "the diagnosis does not say all that it takes".to_owned());
-    let vector = |value: Option<[f64; 3]>| value.map(Vector3::from).ok_or_else(|| "the diagnosis has no twist".to_owned());
-    Ok(match kind {
-        Kind::JointCompliance => Effect::JointCompliance { joint: at()?, stiffness: 1.0 / size },
-        Kind::LinkBending => Effect::LinkBending { link: at()?, compliance: size },
-        Kind::Backlash if told(parameters.sign)? > 0.0 => {
+    let value = |at: usize| coefficients.get(at).copied().ok_or_else(|| "the diagnosis lacks a coefficient".to_owned());
+    // Where only positions of a tool are measured its rotation is not seen.
+    let vector = |from: usize| {
+        let axis = |axis: usize| coefficients.get(from + axis).copied().unwrap_or(0.0);
+        Vector3::new(axis(0), axis(1), axis(2))
+    };
+    let size = value(0)?;
+    // a cos + b sin = amplitude · cos(order · q + phase)
+    let wave = |from: usize| -> Result<(f64, f64), String> {
+        let (a, b) = (value(from)?, value(from + 1)?);
+        Ok((libm::hypot(a, b), libm::atan2(-b, a)))
+    };
+    let after = || effect.parameters.after.ok_or_else(|| "the diagnosis does not say when".to_owned());
+    let (translation, rotation, moves) = (vector(0), vector(3), Moves::Base);
+    let one = match *shape {
+        Shape::Torque { joint } => Effect::JointCompliance { joint, stiffness: 1.0 / size },
+        Shape::MomentAcross { joint } => Effect::LinkBending { link: joint, compliance: size, beam: false },
+        Shape::Beam { joint } => Effect::LinkBending { link: joint, compliance: size, beam: true },
+        Shape::Direction { .. } if size > 0.0 => {
             return Err("the output is ahead of the last move, which no play makes".to_owned());
         }
-        Kind::Backlash => Effect::Backlash { joint: at()?, width: size },
-        Kind::GravityLostMotion => Effect::GravityLostMotion { joint: at()?, width: size },
-        Kind::JointEccentricity => {
-            let order = told(parameters.order)? as u8;
-            Effect::JointEccentricity { joint: at()?, amplitude: size, order, phase: told(parameters.phase_rad)? }
+        Shape::Direction { joint } => Effect::Backlash { joint, width: -size },
+        Shape::TorqueSign { joint } => Effect::GravityLostMotion { joint, width: size },
+        Shape::LeaningTorqueSign { .. } => {
+            return Err("an upright joint seated by an axis that leans: the arm is simulated as it stands in its file".to_owned());
         }
-        Kind::StrainWaveError => {
-            let ratio = 0.5 * told(parameters.order)?;
-            Effect::StrainWaveError { joint: at()?, amplitude: size, ratio, phase: told(parameters.phase_rad)? }
+        Shape::Harmonic { joint, order } if effect.kind == Kind::StrainWaveError => {
+            let (amplitude, phase) = wave(0)?;
+            Effect::StrainWaveError { joint, amplitude, ratio: 0.5 * order, phase }
         }
-        Kind::GearCoupling => {
-            let joint = at()?;
-            let source = parameters.source.and_then(|source| source.checked_sub(1)).ok_or("the diagnosis has no source")?;
-            let (ratio_error, coupling) = if source == joint { (size, 0.0) } else { (0.0, size) };
-            Effect::GearCoupling { joint, ratio_error, coupling, source }
+        Shape::Harmonic { joint, order } => {
+            let (amplitude, phase) = wave(0)?;
+            Effect::JointEccentricity { joint, amplitude, order: order as u8, phase }
         }
-        Kind::LinkThermalGrowth => Effect::LinkThermalGrowth { link: place, expansion: size },
-        Kind::JointThermalDrift => Effect::JointThermalDrift { joint: at()?, drift: size },
-        Kind::RadialClearance => Effect::Clearance { joint: at()?, radial: size, axial: 0.0, tilt: 0.0 },
-        Kind::TiltClearance => Effect::Clearance { joint: at()?, radial: 0.0, axial: 0.0, tilt: size },
-        Kind::BaseDrift => Effect::BaseDrift {
-            moves: Moves::Base,
-            translation: vector(parameters.translation_m)?,
-            rotation: vector(parameters.rotation_rad)?,
-        },
-        Kind::BaseStep => Effect::BaseStep {
-            moves: Moves::Base,
-            translation: vector(parameters.translation_m)?,
-            rotation: vector(parameters.rotation_rad)?,
-            after: told(parameters.after)?,
-        },
-        Kind::ToolStep => Effect::ToolStep {
-            translation: vector(parameters.translation_m)?,
-            rotation: vector(parameters.rotation_rad)?,
-            after: told(parameters.after)?,
-        },
-        Kind::MeasurementScale => return Err("the sensor's: the arm has no part in it, its formula is exact".to_owned()),
-        Kind::MeasurementOutliers => return Err("noise of the sensor: it moves nothing, and is weighted down".to_owned()),
-    })
+        Shape::TwoHarmonics { joint } => {
+            let of = |order: u8| -> Result<Effect, String> {
+                let (amplitude, phase) = wave(2 * usize::from(order - 1))?;
+                Ok(Effect::JointEccentricity { joint, amplitude, order, phase })
+            };
+            return Ok(vec![of(1)?, of(2)?]);
+        }
+        Shape::Ratio { joint, source } if source == joint => {
+            Effect::GearCoupling { joint, ratio_error: size, coupling: 0.0, source }
+        }
+        Shape::Ratio { joint, source } => Effect::GearCoupling { joint, ratio_error: 0.0, coupling: size, source },
+        Shape::Growth { link } => Effect::LinkThermalGrowth { of: Growing::of(link), expansion: size },
+        Shape::GrowthOnFoot { grows } => {
+            let foot = if grows { Foot::AsFirstLink } else { Foot::Still };
+            Effect::LinkThermalGrowth { of: Growing::Arm(foot), expansion: size }
+        }
+        Shape::Warmth { joint } => Effect::JointThermalDrift { joint, drift: size },
+        Shape::ForceAcrossSign { joint, held } => {
+            Effect::Clearance { joint, radial: size, axial: 0.0, tilt: 0.0, held: Some(held) }
+        }
+        Shape::MomentAcrossSign { joint, held } => {
+            Effect::Clearance { joint, radial: 0.0, axial: 0.0, tilt: size, held: Some(held) }
+        }
+        Shape::BaseDrift => Effect::BaseDrift { moves, translation, rotation },
+        Shape::BaseStep { .. } => Effect::BaseStep { moves, translation, rotation, after: after()? },
+        Shape::ToolStep { .. } => Effect::ToolStep { translation, rotation, after: after()? },
+        Shape::Scale => return Err("the sensor's: the arm has no part in it, its formula is exact".to_owned()),
+        Shape::UnequalBend { .. }
+        | Shape::UnequalSeat { .. }
+        | Shape::UnequalShift { .. }
+        | Shape::RootAcross { .. }
+        | Shape::BaseCourse { .. }
+        | Shape::ToolCourse { .. }
+        | Shape::Bump { .. }
+        | Shape::AngleCurve { .. }
+        | Shape::AngleMap { .. }
+        | Shape::Crosstalk { .. }
+        | Shape::Softening { .. }
+        | Shape::Hardening { .. }
+        | Shape::TorqueMemory { .. }
+        | Shape::AllYield
+        | Shape::DirectionLoad { .. }
+        | Shape::Memory { .. }
+        | Shape::TimeCurve { .. } => return Err("a shape without a name".to_owned()),
+    };
+    Ok(vec![one])
 }
 
 /// The arm and the conditions of each reading.
@@ -513,11 +542,11 @@ fn fitted(arm: &Arm, rows: &Rows) -> Arm {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnosis::outcome::{Magnitude, NoiseSource, Parameters};
-    use crate::diagnosis::{Options, diagnose};
-    use crate::effects::Level;
+    use crate::diagnosis::outcome::{Magnitude, NoiseSource};
+    use crate::diagnosis::{Options, diagnose, parameters};
+    use crate::effects::Location;
+    use crate::effects::signature::library::{Hypothesis, library};
     use crate::lab::effect_validation::session;
-    use crate::lab::injection::Sort;
     use crate::progress::Silent;
     use crate::scene::Scene;
     use crate::simulation::cell::measure::measure;
@@ -542,68 +571,116 @@ mod tests {
         diagnose(&scene.arm, &scene.sensor, rows, &options).unwrap()
     }
 
-    fn named(kind: Kind, index: Option<usize>, value: f64, parameters: Parameters) -> outcome::Effect {
+    /// As a diagnosis names it that found these coefficients, in a session of `rows` readings at the same pace.
+    fn named(hypothesis: &Hypothesis, coefficients: &[f64], rows: usize) -> outcome::Effect {
+        let kind = hypothesis.kind.unwrap();
+        let signature = Signature { shape: hypothesis.shape, coefficients: coefficients.to_vec() };
+        let value = coefficients[..hypothesis.shape.magnitude_width()].iter().map(|value| value * value).sum::<f64>().sqrt();
         outcome::Effect {
-            kind: kind.name().to_owned(),
-            location: Place { level: kind.level(), index, time_s: None },
+            kind,
+            location: Place { level: hypothesis.location.level, index: hypothesis.location.index, time_s: None },
             probability: 1.0,
             magnitude: Magnitude { value, unit: kind.unit().to_owned(), ci95: [value; 2] },
-            parameters,
+            parameters: parameters::named(&signature, |row| (row as f64 - 0.5) / (rows as f64 - 1.0)),
+            signature: Some(signature),
             held_out_rms_before_m: 0.0,
             held_out_rms_after_m: 0.0,
             gap_closed: None,
             folds: [5, 5],
-            detail: String::new(),
+            detail: hypothesis.detail.clone(),
         }
     }
 
-    /// Formulas and physics share no code: where they agree, every sign, phase, frame and change point is passed on as meant.
-    #[test]
-    fn every_kind_is_simulated_as_its_formula_means_it() {
-        let (scene, rows) = readings(Vec::new(), 40);
-        let rows: Vec<&Measurement> = rows.iter().collect();
-        let diagnosis = diagnosed(&scene, &rows);
-        let harmonic = |order, phase| Parameters { order: Some(order), phase_rad: Some(phase), ..Parameters::default() };
-        let leak = |source| Parameters { source: Some(source), ..Parameters::default() };
-        let twist = Parameters {
-            translation_m: Some([60e-6, -30e-6, 20e-6]),
-            rotation_rad: Some([20e-6, 50e-6, -40e-6]),
-            ..Parameters::default()
-        };
-        let step = Parameters { after: Some(16.5 / 39.0), row: Some(17), ..twist.clone() };
-        let lags = Parameters { sign: Some(-1.0), ..Parameters::default() };
-        let none = Parameters::default;
-        let held = |share| Parameters { held: Some(share), ..Parameters::default() };
-        let cases = [
-            (Kind::JointCompliance, Some(2), 2e-5, none(), 0.02),
-            (Kind::LinkBending, Some(3), 2e-5, none(), 0.02),
-            (Kind::Backlash, Some(3), 3e-4, lags, 1e-3),
-            // The formula knows the side less well where next to nothing seats the gear.
-            (Kind::GravityLostMotion, Some(4), 3e-4, none(), 0.02),
-            (Kind::JointEccentricity, Some(2), 2e-4, harmonic(1.0, 0.7), 1e-3),
-            (Kind::JointEccentricity, Some(5), 2e-4, harmonic(2.0, -2.1), 1e-3),
-            (Kind::StrainWaveError, Some(3), 1e-4, harmonic(200.0, 1.3), 1e-3),
-            (Kind::GearCoupling, Some(3), -2e-4, leak(3), 2e-3),
-            (Kind::GearCoupling, Some(4), 2e-4, leak(3), 2e-3),
-            (Kind::LinkThermalGrowth, Some(3), 18e-6, none(), 1e-3),
-            // To the target in the formula, to the tool's origin in the physics.
-            (Kind::LinkThermalGrowth, None, 18e-6, none(), 0.02),
-            (Kind::JointThermalDrift, Some(2), -15e-6, none(), 1e-3),
-            (Kind::RadialClearance, Some(2), 40e-6, held(0.05), 0.02),
-            (Kind::BaseDrift, None, 7e-5, twist, 1e-3),
-            (Kind::BaseStep, None, 7e-5, step.clone(), 1e-3),
-            (Kind::ToolStep, None, 7e-5, step, 1e-3),
-        ];
-        for (kind, index, value, parameters, allowed) in cases {
-            let effects = vec![named(kind, index, value, parameters)];
-            let diagnosis = Diagnosis { effects, ..diagnosis.clone() };
-            let found = confirm(&diagnosis, &scene.arm, &scene.sensor, &rows).unwrap();
-            let step = &found.steps[0];
-            let share = step.difference_share.unwrap_or(1.0);
-            println!("{kind:?} {index:?}: {:?} m, {share:.2e}, {}", step.displacement_rms_m, step.reason);
-            assert!(step.simulated && step.displacement_rms_m.unwrap() > 5e-6 && share < allowed, "{step:?}");
-            assert_eq!(step.disagreement, "");
+    /// Of `kind` with this shape at a joint, a link or nowhere.
+    fn of(kind: Kind, shape: Shape, index: Option<usize>) -> Hypothesis {
+        Hypothesis {
+            kind: Some(kind),
+            location: Location { level: kind.level(), index },
+            shape,
+            range: [1.0, 1.0],
+            spread: Vec::new(),
+            detail: String::new(),
+            share: None,
         }
+    }
+
+    fn outliers() -> outcome::Effect {
+        let shape = Shape::Scale;
+        let effect = named(&of(Kind::MeasurementScale, shape, None), &[0.1], 2);
+        outcome::Effect { kind: Kind::MeasurementOutliers, signature: None, ..effect }
+    }
+
+    /// How much of an effect's displacement the first order, or what is not known of a small load, may miss.
+    fn allowed(kind: Kind, index: Option<usize>) -> f64 {
+        match kind {
+            Kind::JointCompliance | Kind::LinkBending => 0.02,
+            // The formula knows the side less well where next to nothing seats the play, or where friction nearly holds it.
+            Kind::GravityLostMotion if index == Some(4) => 0.02,
+            Kind::GravityLostMotion => 0.15,
+            Kind::RadialClearance if index == Some(2) => 0.02,
+            Kind::RadialClearance | Kind::TiltClearance => 0.2,
+            // To the target in the formula, to the tool's origin in the physics.
+            Kind::LinkThermalGrowth => 0.02,
+            _ => 2e-3,
+        }
+    }
+
+    /// Must show 4 of issue 13: what is diagnosed is what waterfall and confirmation test, for every variant of every kind; and formulas
+    /// and physics, which share no code, agree on what it does: every sign, phase, frame and change point is passed on as meant.
+    #[test]
+    fn every_variant_of_every_kind_is_tested_as_it_was_diagnosed() {
+        const ROWS: usize = 40;
+        let (scene, rows) = readings(Vec::new(), ROWS);
+        let rows: Vec<&Measurement> = rows.iter().collect();
+        let waterfall = Waterfall::new(&scene.arm, &scene.sensor, &rows, &[]).unwrap();
+        let simulator = Simulator::new(&scene.arm, &waterfall, &rows);
+        let still = simulator.run(&[]).unwrap();
+        let readings = &waterfall.conditions.readings;
+        let orientation = waterfall.rows.per_row == 6;
+        let all = library(&waterfall.rows.mechanism, &waterfall.conditions.columns);
+        let known: Vec<&Hypothesis> = all.iter().filter(|hypothesis| hypothesis.kind.is_some()).collect();
+        let mut seen = std::collections::BTreeSet::from([Kind::MeasurementOutliers]);
+        let mut wrong = Vec::new();
+        for hypothesis in known {
+            let kind = hypothesis.kind.unwrap();
+            seen.insert(kind);
+            let size = (hypothesis.range[0] * hypothesis.range[1]).sqrt();
+            let coefficients: Vec<f64> = (0..hypothesis.shape.width(orientation))
+                .map(|at| if kind == Kind::Backlash { -size } else { size * [1.0, -0.6, 0.3, 0.5, 0.8, -0.7][at] })
+                .collect();
+            let effect = named(hypothesis, &coefficients, ROWS);
+            // Through JSON, as it is recorded.
+            let effect: outcome::Effect = serde_json::from_str(&serde_json::to_string(&effect).unwrap()).unwrap();
+            assert_eq!(effect.signature.as_ref().unwrap().shape, hypothesis.shape);
+            let formula = waterfall.displacements(&effect).unwrap();
+            for (reading, formula) in readings.iter().zip(&formula) {
+                let columns = hypothesis.shape.columns(reading, orientation);
+                let expected: Displacement = std::array::from_fn(|axis| {
+                    columns.iter().zip(&coefficients).map(|(column, value)| column[axis] * value).sum()
+                });
+                assert_eq!(*formula, expected, "{hypothesis:?}");
+            }
+            // One moment of a step is as good as another.
+            if matches!(hypothesis.shape, Shape::BaseStep { row } | Shape::ToolStep { row } if row % 8 != 1) {
+                continue;
+            }
+            match simulated_as(&effect, waterfall.rows.mechanism.masses_known) {
+                Ok(physical) => {
+                    assert!(physical.iter().all(|physical| physical.kinds() == [kind]), "{physical:?}");
+                    let moved = simulator.displacements(&simulator.run(&physical).unwrap().poses, &still.poses);
+                    let (of_effect, off) = (rms(&moved), rms(&difference(&moved, &formula)));
+                    if off > allowed(kind, hypothesis.location.index) * of_effect && off > 1e-7 {
+                        wrong.push(format!("{hypothesis:?} moves by {of_effect:.2e} m, {off:.2e} m beside its formula"));
+                    }
+                }
+                Err(why) => {
+                    let says = matches!(hypothesis.shape, Shape::LeaningTorqueSign { .. } | Shape::Scale);
+                    assert!(says, "{hypothesis:?}: {why}");
+                }
+            }
+        }
+        assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+        assert!(seen.into_iter().eq(Kind::known()), "a kind without a hypothesis");
     }
 
     #[test]
@@ -628,7 +705,7 @@ mod tests {
         let (scene, rows) = readings(vec![Effect::Backlash { joint: 2, width }], 60);
         let rows: Vec<&Measurement> = rows.iter().collect();
         let diagnosis = diagnosed(&scene, &rows);
-        assert_eq!(diagnosis.effects[0].kind, "backlash");
+        assert_eq!(diagnosis.effects[0].kind, Kind::Backlash);
         assert_eq!(diagnosis.effects[0].parameters.sign, Some(-1.0));
         let confirmed = |diagnosis: &Diagnosis| confirm(diagnosis, &scene.arm, &scene.sensor, &rows).unwrap();
         let found = confirmed(&diagnosis);
@@ -638,12 +715,12 @@ mod tests {
         assert!(last.physics_rms_m < 0.8 * found.geometry_rms_m && last.physics_rms_m < 1.5 * found.noise_rms_m);
         // The same with another width: formula and physics agree, but not with the readings.
         let mut wrong = diagnosis.clone();
-        wrong.effects[0].magnitude.value *= 3.0;
+        wrong.effects[0].signature.as_mut().unwrap().coefficients[0] *= 3.0;
         let found = confirmed(&wrong);
         assert_eq!(found.verdict, Answer::Disagrees, "{}", found.sentence);
         assert!(found.sentence.contains("the magnitudes do not explain"), "{}", found.sentence);
         // No play makes the output lead.
-        wrong.effects[0].parameters.sign = Some(1.0);
+        wrong.effects[0].signature.as_mut().unwrap().coefficients[0] = 3e-4;
         let found = confirmed(&wrong);
         assert_eq!(found.verdict, Answer::NotSimulated, "{}", found.sentence);
         assert!(found.steps[0].reason.contains("no play"));
@@ -656,10 +733,10 @@ mod tests {
     fn play_that_friction_holds_is_told() {
         let (scene, rows) = readings(Vec::new(), 40);
         let rows: Vec<&Measurement> = rows.iter().collect();
-        let effect = named(Kind::TiltClearance, Some(2), 2e-4, Parameters { held: Some(0.0), ..Parameters::default() });
+        let effect = named(&of(Kind::TiltClearance, Shape::MomentAcrossSign { joint: 1, held: 0.0 }, Some(2)), &[2e-4], 40);
         let waterfall = Waterfall::new(&scene.arm, &scene.sensor, &rows, &[]).unwrap();
         let simulator = Simulator::new(&scene.arm, &waterfall, &rows);
-        let ran = simulator.run(&[scene_effect(&effect, &waterfall.rows).unwrap()]).unwrap();
+        let ran = simulator.run(&[Effect::Clearance { joint: 1, radial: 0.0, axial: 0.0, tilt: 2e-4, held: None }]).unwrap();
         let moved = simulator.displacements(&ran.poses, &simulator.run(&[]).unwrap().poses);
         let off = difference(&moved, &waterfall.displacements(&effect).unwrap());
         for ((moved, off), held) in moved.iter().zip(&off).zip(&ran.undecided) {
@@ -669,10 +746,15 @@ mod tests {
                 assert!(length(off) < 0.02 * length(moved), "{moved:?} {off:?}");
             }
         }
-        let diagnosis = Diagnosis { effects: vec![effect], ..diagnosed(&scene, &rows) };
+        // A diagnosis that says that friction holds so much has it so in the physics, and is told how often.
+        let held = named(&of(Kind::TiltClearance, Shape::MomentAcrossSign { joint: 1, held: 0.1 }, Some(2)), &[2e-4], 40);
+        let diagnosis = Diagnosis { effects: vec![held], ..diagnosed(&scene, &rows) };
         let found = confirm(&diagnosis, &scene.arm, &scene.sensor, &rows).unwrap();
-        assert_eq!(found.undecided, ran.undecided.iter().filter(|held| **held).count());
-        assert!(found.undecided > 0 && found.sentence.contains("friction holds it"), "{}", found.sentence);
+        assert!(found.undecided > 0, "{}", found.sentence);
+        // And one that says that nothing is held has nothing held.
+        let diagnosis = Diagnosis { effects: vec![effect], ..diagnosis };
+        let found = confirm(&diagnosis, &scene.arm, &scene.sensor, &rows).unwrap();
+        assert_eq!(found.undecided, 0);
     }
 
     #[test]
@@ -680,16 +762,17 @@ mod tests {
         let (scene, rows) = readings(Vec::new(), 40);
         let rows: Vec<&Measurement> = rows.iter().collect();
         let diagnosis = diagnosed(&scene, &rows);
-        let of = |effect| {
+        let confirmed = |effect| {
             let diagnosis = Diagnosis { effects: vec![effect], ..diagnosis.clone() };
             confirm(&diagnosis, &scene.arm, &scene.sensor, &rows).unwrap()
         };
         // So soft that the arm hangs elsewhere than where its torque was computed.
-        let soft = of(named(Kind::JointCompliance, Some(2), 1.0 / 800.0, Parameters::default()));
+        let compliance = of(Kind::JointCompliance, Shape::Torque { joint: 1 }, Some(2));
+        let soft = confirmed(named(&compliance, &[1.0 / 800.0], 40));
         assert_eq!(soft.verdict, Answer::Disagrees, "{}", soft.sentence);
         assert!(soft.steps[0].difference_share.unwrap() > SHARE_OF_DISPLACEMENT);
         // What no arm has is refused by the physics, in its words.
-        let negative = of(named(Kind::JointCompliance, Some(2), -1e-5, Parameters::default()));
+        let negative = confirmed(named(&compliance, &[-1e-5], 40));
         assert!(negative.steps[0].reason.contains("stiffness"), "{}", negative.steps[0].reason);
     }
 
@@ -698,8 +781,8 @@ mod tests {
         let (scene, rows) = readings(Vec::new(), 30);
         let rows: Vec<&Measurement> = rows.iter().collect();
         let effects = vec![
-            named(Kind::TiltClearance, Some(2), 2e-4, Parameters::default()),
-            named(Kind::MeasurementScale, None, 5e-5, Parameters::default()),
+            named(&of(Kind::TiltClearance, Shape::MomentAcrossSign { joint: 1, held: 0.05 }, Some(2)), &[2e-4], 30),
+            named(&of(Kind::MeasurementScale, Shape::Scale, None), &[5e-5], 30),
         ];
         let diagnosis = Diagnosis { effects, ..diagnosed(&scene, &rows) };
         let schema: serde_json::Value = serde_json::from_str(outcome::SCHEMA).unwrap();
@@ -719,12 +802,11 @@ mod tests {
         let (mut scene, rows) = readings(Vec::new(), 40);
         scene.arm.links.iter_mut().for_each(|link| link.inertial = None);
         let rows: Vec<&Measurement> = rows.iter().collect();
-        let lags = Parameters { sign: Some(-1.0), ..Parameters::default() };
         let effects = vec![
-            named(Kind::JointCompliance, Some(2), 1e-4, Parameters::default()),
-            named(Kind::Backlash, Some(3), 3e-4, lags),
-            named(Kind::MeasurementScale, None, 5e-5, Parameters::default()),
-            named(Kind::MeasurementOutliers, None, 0.1, Parameters::default()),
+            named(&of(Kind::JointCompliance, Shape::Torque { joint: 1 }, Some(2)), &[1e-4], 40),
+            named(&of(Kind::Backlash, Shape::Direction { joint: 2 }, Some(3)), &[-3e-4], 40),
+            named(&of(Kind::MeasurementScale, Shape::Scale, None), &[5e-5], 40),
+            outliers(),
         ];
         let diagnosis = Diagnosis { effects, ..diagnosed(&scene, &rows) };
         let found = confirm(&diagnosis, &scene.arm, &scene.sensor, &rows).unwrap();
@@ -735,34 +817,5 @@ mod tests {
             assert!((step.physics_rms_m - step.analytic_rms_m).abs() < 1e-6, "{step:?}");
         }
         assert!(found.sentence.contains("Not simulated: joint_compliance 2"), "{}", found.sentence);
-    }
-
-    /// Of the kinds that move the arm none is forgotten.
-    #[test]
-    fn kinds_are_those_that_can_be_switched_on() {
-        let (scene, rows) = readings(Vec::new(), 30);
-        let rows: Vec<&Measurement> = rows.iter().collect();
-        let waterfall = Waterfall::new(&scene.arm, &scene.sensor, &rows, &[]).unwrap();
-        let parameters = Parameters {
-            sign: Some(-1.0),
-            phase_rad: Some(0.1),
-            order: Some(2.0),
-            source: Some(2),
-            translation_m: Some([1e-5, 0.0, 0.0]),
-            rotation_rad: Some([0.0; 3]),
-            after: Some(0.5),
-            row: Some(15),
-            factor: None,
-            held: Some(0.0),
-        };
-        for kind in Kind::ALL {
-            let effect = named(kind, Some(2), 1e-4, parameters.clone());
-            let found = scene_effect(&effect, &waterfall.rows);
-            assert_eq!(found.is_err(), kind.level() == Level::Sensor, "{kind:?}");
-            if let Ok(found) = found {
-                assert_eq!(found.kinds(), [kind]);
-                assert!(Sort::from_name(found.name()).is_some());
-            }
-        }
     }
 }

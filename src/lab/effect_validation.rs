@@ -20,7 +20,7 @@ use crate::scene::Scene;
 use crate::seed::stream;
 use crate::simulation::cell::measure::{MeasureError, measure};
 use crate::simulation::cell::plan::Planned;
-use crate::simulation::effect::{Effect, Moves};
+use crate::simulation::effect::{Effect, Foot, Growing, Moves};
 use crate::simulation::injected::{Injected, Noise};
 use crate::simulation::physics::{Conditions, PhysicalArm, PhysicsError, SeatedBy, Settled, Settling, Stop};
 use crate::units::ARCSEC;
@@ -102,7 +102,7 @@ pub fn cases(arm: &Arm) -> Vec<Case> {
     let at = |number: usize| (number - 1).min(arm.joint_count() - 1);
     let one = |name: &str, magnitude: String, effect: Effect| Case { name: name.to_owned(), effects: vec![effect], magnitude };
     let xyz = Vector3::new;
-    let clearance = |joint, radial, axial, tilt| Effect::Clearance { joint, radial, axial, tilt };
+    let clearance = |joint, radial, axial, tilt| Effect::Clearance { joint, radial, axial, tilt, held: None };
     let (j2, j3, j4) = (at(2), at(3), at(4));
     let (compliance, backlash, play) = (
         Effect::JointCompliance { joint: j2, stiffness: 3e4 },
@@ -111,10 +111,15 @@ pub fn cases(arm: &Arm) -> Vec<Case> {
     );
     let joint = |joint: usize, text: &str| format!("{text}, joint {}", joint + 1);
     let link = |link: usize, text: &str| format!("{text}, link {}", link + 1);
+    let growth = |words: &str, foot: Foot| {
+        let of = Growing::Arm(foot);
+        one("link_thermal_growth", words.to_owned(), Effect::LinkThermalGrowth { of, expansion: 18e-6 })
+    };
     let drift = (xyz(30e-6, -30e-6, 20e-6), xyz(20e-6, 30e-6, -20e-6));
     let mut cases = vec![
         one("joint_compliance", joint(j2, "30 kN·m/rad"), compliance.clone()),
-        one("link_bending", link(j2, "20 µrad/(N·m)"), Effect::LinkBending { link: j2, compliance: 2e-5 }),
+        one("link_bending", link(j2, "20 µrad/(N·m)"), Effect::LinkBending { link: j2, compliance: 2e-5, beam: false }),
+        one("link_bending", link(j2, "20 µrad/(N·m), as a beam"), Effect::LinkBending { link: j2, compliance: 2e-5, beam: true }),
         one("backlash", joint(j2, "60 arcsec"), backlash.clone()),
         one("gravity_lost_motion", joint(j4, "60 arcsec"), Effect::GravityLostMotion { joint: j4, width: 60.0 * ARCSEC }),
     ];
@@ -133,8 +138,10 @@ pub fn cases(arm: &Arm) -> Vec<Case> {
             joint(j3, "200 µrad/rad of itself and of joint 2"),
             Effect::GearCoupling { joint: j3, ratio_error: 2e-4, coupling: 2e-4, source: j2 },
         ),
-        one("link_thermal_growth", link(j3, "18 µm/m/K"), Effect::LinkThermalGrowth { link: Some(j3), expansion: 18e-6 }),
-        one("link_thermal_growth", "18 µm/m/K, all".to_owned(), Effect::LinkThermalGrowth { link: None, expansion: 18e-6 }),
+        one("link_thermal_growth", link(j3, "18 µm/m/K"), Effect::LinkThermalGrowth { of: Growing::Link(j3), expansion: 18e-6 }),
+        growth("18 µm/m/K, all", Foot::Own),
+        growth("18 µm/m/K, all, the foot as warm as the first link", Foot::AsFirstLink),
+        growth("18 µm/m/K, all but the foot", Foot::Still),
         one("joint_thermal_drift", joint(j2, "15 µrad/K"), Effect::JointThermalDrift { joint: j2, drift: 15e-6 }),
         one("radial_clearance", joint(j2, "30 µm"), clearance(j2, 30e-6, 0.0, 0.0)),
         one("tilt_clearance", joint(j4, "100 µrad"), clearance(j4, 0.0, 0.0, 100e-6)),
@@ -182,9 +189,9 @@ pub fn cases(arm: &Arm) -> Vec<Case> {
             name: "compliance, bending, clearance, growth".to_owned(),
             effects: vec![
                 compliance,
-                Effect::LinkBending { link: j3, compliance: 2e-5 },
+                Effect::LinkBending { link: j3, compliance: 2e-5, beam: false },
                 clearance(j4, 30e-6, 10e-6, 100e-6),
-                Effect::LinkThermalGrowth { link: None, expansion: 18e-6 },
+                Effect::LinkThermalGrowth { of: Growing::Arm(Foot::Own), expansion: 18e-6 },
             ],
             magnitude: "joints 2 to 4, all links".to_owned(),
         },
@@ -609,8 +616,13 @@ impl<'a> Statics<'a> {
                 Effect::HardeningStiffness { joint, stiffness, cubic } => {
                     turn(joint, root_of_cubic(stiffness, cubic, torque(joint)));
                 }
-                Effect::LinkBending { link, compliance } => {
+                Effect::LinkBending { link, compliance, beam: false } => {
                     motions.joints[link].rotation += across(wrenches[link].moment) * compliance;
+                }
+                Effect::LinkBending { link, compliance, beam: true } => {
+                    let bent = bent_beam(standing, link, &wrenches[link], compliance);
+                    motions.joints[link].translation += bent.translation;
+                    motions.joints[link].rotation += bent.rotation;
                 }
                 Effect::Backlash { joint, width } => {
                     let direction = f64::from(row.planned.approach()[joint]);
@@ -638,10 +650,15 @@ impl<'a> Statics<'a> {
                     }
                 }
                 Effect::CreepAfterMotion { joint, .. } | Effect::MemoryHysteresis { joint, .. } => turn(joint, *memory),
-                Effect::LinkThermalGrowth { link, expansion } => {
-                    let links = link.map_or(0..q.len() + 1, |link| link + 1..link + 2);
+                Effect::LinkThermalGrowth { of, expansion } => {
+                    let links = match of {
+                        Growing::Link(link) => link + 1..link + 2,
+                        Growing::Arm(Foot::Still) => 1..q.len() + 1,
+                        Growing::Arm(Foot::Own | Foot::AsFirstLink) => 0..q.len() + 1,
+                    };
                     for link in links {
-                        let grown = expansion * row.rise_k[link];
+                        let warm = if of == Growing::Arm(Foot::AsFirstLink) { link.max(1) } else { link };
+                        let grown = expansion * row.rise_k[warm];
                         let start = if link == 0 { self.foot() } else { standing.centres[link - 1][1] };
                         match standing.centres.get(link) {
                             Some([end, _]) => {
@@ -652,7 +669,7 @@ impl<'a> Statics<'a> {
                         }
                     }
                 }
-                Effect::Clearance { joint, radial, axial, tilt } => {
+                Effect::Clearance { joint, radial, axial, tilt, .. } => {
                     let Wrench { force, moment } = wrenches[joint];
                     let twist = &mut motions.joints[joint];
                     let [by_radial, by_axial, by_tilt, _] = row.decided(joint);
@@ -753,6 +770,26 @@ fn about(centre: &Vector3<f64>, translation: &Vector3<f64>, rotation: &Vector3<f
     Pose::from_parts(Translation3::from(centre + translation - turn * centre), turn)
 }
 
+/// What a link does that bends as a slender beam from its joint to the next: slice by slice, each turned about its own place by the
+/// moment there; in the joint's axes about its centre.
+fn bent_beam(standing: &Standing, link: usize, wrench: &Wrench, compliance: f64) -> Twist {
+    const SLICES: usize = 2000;
+    let [start, centre] = standing.centres[link];
+    let end = standing.centres.get(link + 1).map_or(standing.tool.translation.vector, |[before, _]| *before);
+    let in_joint = standing.axes[link].transpose();
+    let (start, along) = (in_joint * (start - centre), in_joint * (end - start));
+    let direction = along / along.norm();
+    let mut bent = NO_TWIST;
+    for slice in 0..SLICES {
+        let at = start + along * ((slice as f64 + 0.5) / SLICES as f64);
+        let moment = wrench.moment - at.cross(&wrench.force);
+        let turn = (moment - direction * direction.dot(&moment)) * (compliance / SLICES as f64);
+        bent.rotation += turn;
+        bent.translation -= turn.cross(&at);
+    }
+    bent
+}
+
 /// The root of `stiffness · θ + cubic · θ³ = torque`, by bisection.
 fn root_of_cubic(stiffness: f64, cubic: f64, torque: f64) -> f64 {
     let (mut low, mut high) = (0.0, torque.abs() / stiffness);
@@ -807,13 +844,13 @@ mod tests {
         let (stiffness, width) = if turns { (within(2e3, 6e4), width) } else { (within(5e6, 5e7), small) };
         match stream.index(if turns { 18 } else { 12 }) {
             0 => Effect::JointCompliance { joint, stiffness },
-            1 => Effect::LinkBending { link: joint, compliance: 0.2 / stiffness.clamp(4e3, 4e4) },
+            1 => Effect::LinkBending { link: joint, compliance: 0.2 / stiffness.clamp(4e3, 4e4), beam: false },
             2 => Effect::Backlash { joint, width },
             3 => Effect::GravityLostMotion { joint, width },
             4 => Effect::GearCoupling { joint, ratio_error: 2e-4, coupling: -1e-4, source },
-            5 => Effect::LinkThermalGrowth { link: Some(joint), expansion: 2e-5 },
-            6 => Effect::LinkThermalGrowth { link: None, expansion: 1.2e-5 },
-            7 => Effect::Clearance { joint, radial: small, axial: small / 2.0, tilt: 3.0 * small },
+            5 => Effect::LinkThermalGrowth { of: Growing::Link(joint), expansion: 2e-5 },
+            6 => Effect::LinkThermalGrowth { of: Growing::Arm(Foot::Own), expansion: 1.2e-5 },
+            7 => Effect::Clearance { joint, radial: small, axial: small / 2.0, tilt: 3.0 * small, held: None },
             8 => Effect::BaseDrift { moves: Moves::Base, translation: shift, rotation: shift },
             9 => Effect::BaseStep { moves: Moves::Base, translation: shift, rotation: -shift, after: share },
             10 => Effect::ToolStep { translation: shift * 5.0, rotation: shift, after: share },

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::challenge::{Options, case};
 use super::detectability::{difference, has_signal, noiseless};
-use super::injection::Sort;
+use super::injection::places;
 use crate::diagnosis::conditions::conditions;
 use crate::diagnosis::rows::{Readings, fit};
 use crate::effects::Kind;
@@ -12,6 +12,7 @@ use crate::effects::signature::library::library;
 use crate::effects::signature::posture::Mechanism;
 use crate::lab::reproduce::arms::arm8;
 use crate::seed::stream;
+use crate::simulation::effect::Effect;
 use crate::simulation::injected::{Injected, Noise};
 
 /// Share of a displacement that its signature may miss, and where it is more, why.
@@ -52,11 +53,10 @@ fn every_signature_is_what_physics_makes() {
     .unwrap();
     let known = conditions(&rows, &fitted);
     let library = library(&Mechanism::new(&scene.arm), &known.columns);
-    for kind in Kind::ALL {
-        let sort = Sort::Known(kind);
-        for place in sort.places(&scene.arm) {
-            let magnitude = sort.range(place, &scene.arm)[1];
-            let effect = sort.effect(place, magnitude, &scene.arm, &mut stream(4, kind.name()));
+    for kind in Kind::known() {
+        for place in places(kind, &scene.arm) {
+            let magnitude = kind.range(place, scene.arm.joint_count())[1];
+            let effect = Effect::drawn(kind, place, magnitude, &scene.arm, &mut stream(4, kind.name()));
             if !has_signal(&effect) {
                 continue;
             }

@@ -17,9 +17,10 @@ use crate::design::outcome::{Advice, DesignOutcome, EvennessDomains, RandomRefer
 use crate::diagnosis::held_out::Block;
 use crate::diagnosis::outcome::{
     self, Blocked, Candidate, Diagnosis, Effect, Gap, LeftOut, Magnitude, Map, MinimumDetectable, NoiseFloor, NoiseSource,
-    Parameters, Place, Undetectable, Unknown, Verdict,
+    Parameters, Place, Signature, Undetectable, Unknown, Verdict,
 };
-use crate::effects::Level;
+use crate::effects::signature::shape;
+use crate::effects::{Kind, Level};
 use crate::event::RealCell;
 use crate::event::{Event, Start};
 use crate::identification::outcome::{Combination, DeclaredNoise, Errors, Identification, ParameterEstimate, Residual, Summary};
@@ -230,7 +231,7 @@ fn events(size: &Size) -> Vec<Event> {
 fn diagnosis(stream: &mut Stream, readings: usize) -> Diagnosis {
     let place = |index, time_s| Place { level: Level::Joint, index, time_s };
     let effect = |stream: &mut Stream, parameters| Effect {
-        kind: "backlash".to_owned(),
+        kind: Kind::Backlash,
         location: place(Some(3), None),
         probability: stream.uniform(0.0, 1.0),
         magnitude: Magnitude {
@@ -239,6 +240,10 @@ fn diagnosis(stream: &mut Stream, readings: usize) -> Diagnosis {
             ci95: [-0.0, stream.uniform(0.0, 1e-3)],
         },
         parameters,
+        signature: Some(Signature {
+            shape: shape::Shape::Harmonic { joint: 2, order: 2.0 },
+            coefficients: vec![stream.uniform(0.0, 1e-3), -0.0],
+        }),
         held_out_rms_before_m: stream.uniform(0.0, 1e-3),
         held_out_rms_after_m: stream.uniform(0.0, 1e-3),
         gap_closed: Some(stream.uniform(0.0, 1.0)),
@@ -257,16 +262,16 @@ fn diagnosis(stream: &mut Stream, readings: usize) -> Diagnosis {
         factor: Some(3.0),
         held: Some(0.1),
     };
-    let none = Effect { gap_closed: None, ..effect(stream, Parameters::default()) };
+    let none = Effect { gap_closed: None, signature: None, ..effect(stream, Parameters::default()) };
     let candidate = |stream: &mut Stream, index| Candidate {
-        kind: "unknown".to_owned(),
+        kind: None,
         location: place(index, Some(12.5)),
         probability: stream.uniform(0.0, 1.0),
         detail: "a bump".to_owned(),
     };
     let sets = [[Some(1), None], [Some(2), Some(4)]].map(|set| set.map(|index| candidate(stream, index)).to_vec());
     let least = |value, reason: &str| Undetectable {
-        kind: "base_drift".to_owned(),
+        kind: Kind::BaseDrift,
         location: Place { level: Level::Base, index: None, time_s: None },
         minimum_detectable: MinimumDetectable { value, unit: "m".to_owned() },
         reason: reason.to_owned(),

@@ -3,7 +3,7 @@
 use super::table;
 use crate::diagnosis::held_out::Block;
 use crate::diagnosis::outcome::{Candidate, Diagnosis, Map, NoiseSource, Place};
-use crate::effects::Level;
+use crate::effects::{Kind, Level};
 use crate::units::number;
 
 /// The whole report.
@@ -144,7 +144,7 @@ pub(crate) fn causes(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
             let magnitude = &effect.magnitude;
             let (unit, factor) = shown(&magnitude.unit);
             vec![
-                effect.kind.clone(),
+                effect.kind.to_string(),
                 place(&effect.location),
                 format!("{:.1} %", 100.0 * effect.probability),
                 format!("{} {unit}", number(magnitude.value * factor)),
@@ -197,7 +197,14 @@ pub(crate) const CANDIDATES: [&str; 4] = ["kind", "where", "probability", ""];
 /// Its rows, one per hypothesis.
 pub(crate) fn candidates(set: &[Candidate]) -> Vec<Vec<String>> {
     set.iter()
-        .map(|one| vec![one.kind.clone(), place(&one.location), format!("{:.1} %", 100.0 * one.probability), one.detail.clone()])
+        .map(|one| {
+            vec![
+                one.kind_name().to_owned(),
+                place(&one.location),
+                format!("{:.1} %", 100.0 * one.probability),
+                one.detail.clone(),
+            ]
+        })
         .collect()
 }
 
@@ -219,13 +226,13 @@ fn picture(map: &Map) -> String {
 
 /// Kinds with the places at which they cannot be seen.
 fn blind(diagnosis: &Diagnosis) -> String {
-    let mut kinds: Vec<(&str, Vec<String>)> = Vec::new();
+    let mut kinds: Vec<(Kind, Vec<String>)> = Vec::new();
     for one in &diagnosis.undetectable {
         let whole = if one.location.level == Level::Link { "whole arm" } else { "" };
         let index = one.location.index.map_or_else(|| whole.to_owned(), |index| index.to_string());
         match kinds.iter_mut().find(|(kind, _)| *kind == one.kind) {
             Some((_, places)) => places.push(index),
-            None => kinds.push((&one.kind, vec![index])),
+            None => kinds.push((one.kind, vec![index])),
         }
     }
     let said: Vec<String> =

@@ -3,84 +3,39 @@
 use serde_json::{Value, json};
 
 use super::table;
-use crate::effects::{Kind, Level};
+use crate::effects::Kind;
+use crate::effects::catalogue::{needs, place, range};
 use crate::lab::effect_validation::{Line, MARK_M, MARK_POSES_PER_S, MARK_RELATIVE, MARK_SETTLING_M};
-use crate::scene::effect_file::{KINDS, KindKeys};
+use crate::scene::effect_file;
 use crate::units::number;
-
-/// An effect that a scene may inject: kind, where it sits, unit of its magnitude, and what is realistic at about 1 m of reach.
-struct Entry {
-    kind: &'static str,
-    place: &'static str,
-    unit: &'static str,
-    range: &'static str,
-    known: bool,
-}
-
-/// Realistic ranges: `../shared/design/effects.md`, where they are quoted from the calibration literature and data sheets.
-fn range(kind: Kind) -> &'static str {
-    match kind {
-        Kind::JointCompliance => "1.7–100·10⁻⁵ (base), 6.7–50·10⁻⁵ (wrist): 1–6 and 0.2–1.5·10⁴ N·m/rad",
-        Kind::LinkBending => "0.5–5·10⁻⁵",
-        Kind::Backlash | Kind::GravityLostMotion => "1–6·10⁻⁴ (20–120 arcsec)",
-        Kind::JointEccentricity => "0.5–5·10⁻⁴ (10–100 arcsec)",
-        Kind::StrainWaveError => "0.4–2·10⁻⁴ (8–40 arcsec)",
-        Kind::GearCoupling => "5–40·10⁻⁵",
-        Kind::LinkThermalGrowth => "12–24·10⁻⁶",
-        Kind::JointThermalDrift => "3–30·10⁻⁶",
-        Kind::RadialClearance => "10–60·10⁻⁶",
-        Kind::TiltClearance => "20–200·10⁻⁶",
-        Kind::BaseDrift | Kind::BaseStep => "15–80·10⁻⁶",
-        Kind::ToolStep => "0.05–0.5·10⁻³",
-        Kind::MeasurementScale => "10–100·10⁻⁶",
-        Kind::MeasurementOutliers => "0.01–0.1",
-    }
-}
-
-/// Kinds that the diagnosis has no name for: kind, place, unit, range.
-const UNNAMED: [(&str, &str, &str, &str); 6] = [
-    ("worn_tooth_sector", "joint", "rad", "2–10·10⁻⁴"),
-    ("creep_after_motion", "joint", "rad/(N·m)", "0.2–2·10⁻⁵"),
-    ("moment_crosstalk", "joint", "rad/(N·m)", "1–10·10⁻⁶"),
-    ("memory_hysteresis", "joint", "rad", "1–6·10⁻⁴"),
-    ("wrong_payload", "tool", "kg", "0.2–3"),
-    ("hardening_stiffness", "joint", "rad/(N·m)", "as joint_compliance"),
-];
-
-fn entries() -> Vec<Entry> {
-    let place = |level| match level {
-        Level::Joint => "joint",
-        Level::Link => "link",
-        Level::Base => "base or sensor",
-        Level::Tool => "tool",
-        Level::Sensor => "sensor",
-    };
-    let known = Kind::ALL.into_iter().map(|kind| Entry {
-        kind: kind.name(),
-        place: place(kind.level()),
-        unit: kind.unit(),
-        range: range(kind),
-        known: true,
-    });
-    let unnamed = UNNAMED.into_iter().map(|(kind, place, unit, range)| Entry { kind, place, unit, range, known: false });
-    known.chain(unnamed).collect()
-}
 
 /// All effects.
 #[must_use]
 pub fn library() -> String {
-    let row = |entry: &Entry| {
-        let named = if entry.known { "yes" } else { "no" };
-        [entry.kind, entry.place, entry.unit, entry.range, named].map(str::to_owned).to_vec()
+    let row = |kind: Kind| {
+        let of = kind.descriptor();
+        let named = if of.known { "yes" } else { "no" };
+        let needs = needs(kind);
+        [of.name, place(of.level), of.unit.name(), of.magnitude, &range(of.range), &needs, named].map(str::to_owned).to_vec()
     };
-    let rows = entries().iter().map(row).collect();
-    let keys = KINDS.iter().map(|kind| vec![kind.kind.to_owned(), kind.keys(), kind.about.to_owned()]).collect();
+    let rows = Kind::ALL.map(row).to_vec();
+    let sources = Kind::ALL.map(|kind| vec![kind.name().to_owned(), kind.descriptor().source.words().to_owned()]).to_vec();
+    let neighbour = |kind: Kind| {
+        let others = kind.descriptor().neighbours.iter();
+        others.map(move |other| [kind.name(), other.kind.name(), other.told_apart_by].map(str::to_owned).to_vec())
+    };
+    let neighbours = Kind::known().flat_map(neighbour).collect();
+    let keys =
+        effect_file::kinds().map(|(kind, keys, about)| vec![kind.to_owned(), keys.in_a_line(), about.to_owned()]).collect();
     format!(
         "Effects that a scene can inject ([[injected.effect]]); true pose = pose at the readings + effect.\n{}\n\
-         Magnitudes are those of results, in SI; a scene's keys carry their own units. Backlash and lost motion: full width; \
-         clearances: radius; drift and steps: length of the translation; outliers: share of the readings.\n\n\
+         Magnitudes are those of results, in SI; a scene's keys carry their own units.\n\n\
+         Where the realistic ranges come from.\n{}\n\
+         What is mistaken for what.\n{}\n\
          Keys of a table [[injected.effect]], besides kind; [in brackets]: may be left out.\n{}",
-        table(&["kind", "place", "unit", "realistic", "known to the diagnosis"], rows),
+        table(&["kind", "place", "unit", "magnitude", "realistic", "the data must have", "known to the diagnosis"], rows),
+        table(&["kind", "source"], sources),
+        table(&["kind", "mistaken for", "told apart by"], neighbours),
         table(&["kind", "keys", "what happens"], keys)
     )
 }
@@ -88,19 +43,29 @@ pub fn library() -> String {
 /// The same for a machine.
 #[must_use]
 pub fn library_json() -> Value {
-    let entry = |entry: &Entry| {
+    let entry = |kind: Kind| {
+        let of = kind.descriptor();
+        let neighbours = of.neighbours.iter();
         json!({
-            "kind": entry.kind,
-            "place": entry.place,
-            "unit": entry.unit,
-            "realistic": entry.range,
-            "known_to_the_diagnosis": entry.known,
+            "kind": of.name,
+            "about": of.about,
+            "place": place(of.level),
+            "unit": of.unit.name(),
+            "magnitude": of.magnitude,
+            "realistic": range(of.range),
+            "source": of.source.words(),
+            "needs": of.needs.iter().map(|need| need.words()).collect::<Vec<_>>(),
+            "one_signed": of.one_signed,
+            "known_to_the_diagnosis": of.known,
+            "neighbours": neighbours
+                .map(|other| json!({ "kind": other.kind.name(), "told_apart_by": other.told_apart_by }))
+                .collect::<Vec<_>>(),
         })
     };
-    let keys = |kind: &KindKeys| json!({ "kind": kind.kind, "keys": kind.keys(), "about": kind.about });
+    let keys = |(kind, keys, about): (&str, crate::effects::SceneKeys, &str)| json!({ "kind": kind, "keys": keys.in_a_line(), "about": about });
     json!({
-        "effects": entries().iter().map(entry).collect::<Vec<_>>(),
-        "scene_keys": KINDS.iter().map(keys).collect::<Vec<_>>(),
+        "effects": Kind::ALL.map(entry).to_vec(),
+        "scene_keys": effect_file::kinds().map(keys).collect::<Vec<_>>(),
     })
 }
 

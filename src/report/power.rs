@@ -3,11 +3,11 @@
 use super::table;
 use crate::figure::{Axis, Colour, Estimate, Figure, Kind, Panel, Series};
 use crate::lab::challenge::power::{Curve, Report};
-use crate::lab::injection::{Sort, units};
+use crate::lab::injection::units;
 use crate::units::number;
 
 fn unit(curve: &Curve) -> (&'static str, f64) {
-    units(Sort::Known(curve.kind))[0]
+    units(curve.kind)[0]
 }
 
 fn place(curve: &Curve) -> String {

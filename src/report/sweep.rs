@@ -1,8 +1,9 @@
 //! What a sweep found: a table for people, tables for CSV, and a figure.
 
 use super::table;
+use crate::effects;
 use crate::figure::{Axis, Colour, Estimate, Figure, Kind, Panel, Series};
-use crate::lab::injection::{Sort, units};
+use crate::lab::injection::units;
 use crate::lab::reproduce::findings::Data;
 use crate::lab::sweep::grid::{AS_THE_SCENE, NOTHING};
 use crate::lab::sweep::{Cell, CellSummary};
@@ -250,10 +251,10 @@ pub fn figure(scene: &str, cells: &[CellSummary]) -> Figure {
     if lines.is_empty() {
         lines = cells.iter().map(|cell| (conditions(&cell.what).join(", "), vec![cell])).collect();
     }
-    let sort = cells.iter().find_map(|cell| Sort::from_name(&cell.what.effect)).filter(|_| single);
-    let (unit, factor) = sort.map_or(("SI", 1.0), |sort| units(sort)[0]);
+    let injected = cells.iter().find_map(|cell| effects::Kind::from_name(&cell.what.effect)).filter(|_| single);
+    let (unit, factor) = injected.map_or(("SI", 1.0), |kind| units(kind)[0]);
     let x = || {
-        let what = sort.map_or("magnitude".to_owned(), |sort| sort.name().replace('_', " "));
+        let what = injected.map_or("magnitude".to_owned(), |kind| kind.name().replace('_', " "));
         Axis::linear(format!("{what} ({unit})")).zero()
     };
     let panel = |title: &str, y: Axis, get: &dyn Fn(&CellSummary) -> Option<Mean>, bound: Option<f64>| {

@@ -1,4 +1,5 @@
-//! `[[injected.effect]]`: which keys belong to which kind of effect, and what they become.
+//! `[[injected.effect]]`: what the keys of a table become. Which keys a kind has is in the table of kinds
+//! ([`Kind::descriptor`]).
 
 use nalgebra::Vector3;
 
@@ -7,132 +8,22 @@ use super::error::{Invalid, suggestion};
 use super::file::{EffectToml, OneOrEach};
 use crate::arm::Arm;
 use crate::arm::JointKind;
-use crate::simulation::effect::Effect;
+use crate::effects::{Kind, SceneKeys, ScenePlace};
+use crate::simulation::effect::{Effect, Growing, Values};
 use crate::units::ARCSEC;
 
-/// What a kind of effect sits on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
-    /// `joint = "…"`, one that turns.
-    TurningJoint,
-    /// `joint = "…"`.
-    Joint,
-    /// `link = "…"`.
-    Link,
-    /// `link = "…"`, or none: the whole arm.
-    LinkOrArm,
-    /// Nothing that has a name.
-    Nowhere,
-}
+/// All plays of a bearing in one table, besides the kinds that have one each.
+pub const CLEARANCE: &str = "clearance";
+/// What happens there.
+pub const CLEARANCE_ABOUT: &str = "all plays of a bearing together";
+/// Its keys.
+pub const CLEARANCE_KEYS: SceneKeys =
+    SceneKeys { place: ScenePlace::Joint, required: &[], optional: &["radial_um", "axial_um", "tilt_urad"] };
 
-/// A kind of effect as it is written in a scene.
-#[derive(Clone, Copy, Debug)]
-pub struct KindKeys {
-    /// Value of `kind`.
-    pub kind: &'static str,
-    /// What it sits on.
-    pub place: Place,
-    /// Keys that it needs.
-    pub required: &'static [&'static str],
-    /// Keys that it may have.
-    pub optional: &'static [&'static str],
-    /// What happens.
-    pub about: &'static str,
-}
-
-const fn kind(
-    kind: &'static str,
-    place: Place,
-    required: &'static [&'static str],
-    optional: &'static [&'static str],
-    about: &'static str,
-) -> KindKeys {
-    KindKeys { kind, place, required, optional, about }
-}
-
-/// Every kind. Those after `measurement_outliers` are not in the analyser's library.
-pub const KINDS: [KindKeys; 23] = [
-    kind("joint_compliance", Place::TurningJoint, &["stiffness_nm_per_rad"], &[], "a spring between servo and joint"),
-    kind("link_bending", Place::Link, &["compliance_urad_per_nm"], &[], "an elastic hinge across the joint's axis"),
-    kind("backlash", Place::TurningJoint, &["width_arcsec"], &[], "play in a gear whose output friction holds: it lags"),
-    kind("gravity_lost_motion", Place::TurningJoint, &["width_arcsec"], &[], "the same play, seated by gravity"),
-    kind(
-        "joint_eccentricity",
-        Place::TurningJoint,
-        &["amplitude_arcsec"],
-        &["order", "phase_deg"],
-        "encoder off or tilted on its axis",
-    ),
-    kind("strain_wave_error", Place::TurningJoint, &["amplitude_arcsec", "ratio"], &["phase_deg"], "ripple twice per motor turn"),
-    kind(
-        "gear_coupling",
-        Place::TurningJoint,
-        &[],
-        &["ratio_error_urad_per_rad", "coupling_urad_per_rad", "source"],
-        "ratio error, and motion that leaks from another joint",
-    ),
-    kind("link_thermal_growth", Place::LinkOrArm, &["expansion_um_per_m_per_k"], &[], "links grow with their temperature"),
-    kind("joint_thermal_drift", Place::TurningJoint, &["drift_urad_per_k"], &[], "joint zero drifts with its link's temperature"),
-    kind("radial_clearance", Place::Joint, &["radial_um"], &[], "radial play of a bearing, seated by the load"),
-    kind("tilt_clearance", Place::Joint, &["tilt_urad"], &[], "tilting play of a bearing, seated by the moment"),
-    kind("clearance", Place::Joint, &[], &["radial_um", "axial_um", "tilt_urad"], "all plays of a bearing together"),
-    kind("base_drift", Place::Nowhere, &["translation_um"], &["rotation_urad", "moves"], "base or sensor move over the session"),
-    kind("base_step", Place::Nowhere, &["translation_um", "after"], &["rotation_urad", "moves"], "base or sensor move at once"),
-    kind("tool_step", Place::Nowhere, &["translation_um", "after"], &["rotation_urad"], "tool or reflector seated anew"),
-    kind("measurement_scale", Place::Nowhere, &["scale_ppm"], &[], "the sensor's distances are wrong by a factor"),
-    kind("measurement_outliers", Place::Nowhere, &["share", "factor"], &[], "some readings have a larger noise"),
-    kind(
-        "worn_tooth_sector",
-        Place::TurningJoint,
-        &["depth_arcsec", "centre_deg", "half_width_deg"],
-        &[],
-        "the output falls behind in a sector",
-    ),
-    kind(
-        "creep_after_motion",
-        Place::TurningJoint,
-        &["compliance_urad_per_nm", "time_constant_s"],
-        &[],
-        "the joint yields slowly after a move",
-    ),
-    kind("moment_crosstalk", Place::TurningJoint, &["gain_urad_per_nm"], &[], "a moment across the axis turns the joint"),
-    kind(
-        "memory_hysteresis",
-        Place::TurningJoint,
-        &["amplitude_arcsec", "travel_deg"],
-        &[],
-        "the joint remembers its last moves",
-    ),
-    kind(
-        "wrong_payload",
-        Place::Nowhere,
-        &["excess_kg", "stiffness_nm_per_rad"],
-        &[],
-        "the payload weighs more than is believed",
-    ),
-    kind(
-        "hardening_stiffness",
-        Place::TurningJoint,
-        &["stiffness_nm_per_rad", "cubic_nm_per_mrad3"],
-        &[],
-        "a joint that stiffens under load",
-    ),
-];
-
-impl KindKeys {
-    /// Its keys, place included, in a line.
-    #[must_use]
-    pub fn keys(&self) -> String {
-        let place: &[&str] = match self.place {
-            Place::TurningJoint | Place::Joint => &["joint"],
-            Place::Link => &["link"],
-            Place::LinkOrArm => &["[link]"],
-            Place::Nowhere => &[],
-        };
-        let optional = self.optional.iter().map(|key| format!("[{key}]"));
-        let keys: Vec<String> = place.iter().chain(self.required).map(|key| (*key).to_owned()).chain(optional).collect();
-        keys.join(", ")
-    }
+/// What a table may say as its `kind`: the name, its keys, and what happens.
+pub fn kinds() -> impl Iterator<Item = (&'static str, SceneKeys, &'static str)> {
+    let of = |kind: Kind| (kind.name(), kind.descriptor().scene, kind.descriptor().about);
+    Kind::ALL.into_iter().map(of).chain([(CLEARANCE, CLEARANCE_KEYS, CLEARANCE_ABOUT)])
 }
 
 /// Largest play of a turn, rad, and of a shift, m: beyond these a unit was probably mistaken.
@@ -143,128 +34,88 @@ const LARGEST_TURN_ARCSEC: f64 = 2060.0;
 
 /// The effects that one table asks for: one, or one per link where a list of expansions is given.
 pub(super) fn effects(file: &EffectToml, key: &str, arm: &Arm) -> Checked<Vec<Effect>> {
-    let names: Vec<&str> = KINDS.iter().map(|kind| kind.kind).collect();
-    let Some(kind) = KINDS.iter().find(|kind| kind.kind == file.kind) else {
+    let Some((name, keys, _)) = kinds().find(|(name, _, _)| *name == file.kind) else {
+        let names: Vec<&str> = kinds().map(|(name, _, _)| name).collect();
         let remedy =
             suggestion(&file.kind, &names).unwrap_or_else(|| "use one of these kinds; `kincal effects` tells of each".to_owned());
         return Err(Invalid::new(format!("{key}.kind"), format!("{:?}", file.kind), names.join(", "), remedy));
     };
-    check_keys(file, kind, key)?;
-    let place = place(file, kind, key, arm)?;
-    let at = place.unwrap_or(0);
+    check_keys(file, name, &keys, key)?;
+    let place = place(file, name, &keys, key, arm)?;
+    let values = values(file, key, place, arm)?;
+    Ok(match Kind::from_name(name) {
+        None => vec![Effect::clearance(place.unwrap_or(0), &values)],
+        Some(Kind::LinkThermalGrowth) => growth(file, &format!("{key}.expansion_um_per_m_per_k"), place, arm)?,
+        Some(kind) => vec![Effect::from_values(kind, place, &values)],
+    })
+}
+
+/// Every number of a table that is given, checked and in SI.
+fn values(file: &EffectToml, key: &str, place: Option<usize>, arm: &Arm) -> Checked<Values> {
     let path = |name: &str| format!("{key}.{name}");
-    let given = |name: &str, value: Option<f64>, least: fn(f64, &str) -> Checked<f64>, most: f64| -> Checked<f64> {
-        at_most(least(value.unwrap_or(0.0), &path(name))?, most, &path(name))
+    type Least = fn(f64, &str) -> Checked<f64>;
+    // A number that is not given is none to complain of.
+    let given = |name: &str, value: Option<f64>, least: Least, most: f64| -> Checked<f64> {
+        value.map_or(Ok(0.0), |value| at_most(least(value, &path(name))?, most, &path(name)))
     };
-    let stiffness = || given("stiffness_nm_per_rad", file.stiffness_nm_per_rad, positive, 1e12);
-    let width = || Ok(given("width_arcsec", file.width_arcsec, positive, LARGEST_TURN_ARCSEC)? * ARCSEC);
-    let amplitude = || Ok(given("amplitude_arcsec", file.amplitude_arcsec, positive, LARGEST_TURN_ARCSEC)? * ARCSEC);
-    let phase = file.phase_deg.unwrap_or(0.0).to_radians();
-    let compliance = || Ok(given("compliance_urad_per_nm", file.compliance_urad_per_nm, positive, 1e4)? / 1e6);
-    let radial = || Ok(given("radial_um", file.radial_um, not_negative, LARGEST_SHIFT_UM)? / 1e6);
-    let tilt = || Ok(given("tilt_urad", file.tilt_urad, not_negative, LARGEST_TURN_URAD)? / 1e6);
     let signed = |name: &str, value: Option<f64>, most: f64| -> Checked<f64> {
         let value = value.unwrap_or(0.0);
         at_most(value.abs(), most, &path(name))?;
-        Ok(value / 1e6)
+        Ok(value)
     };
     let vector = |name: &str, value: Option<[f64; 3]>, most: f64| -> Checked<Vector3<f64>> {
         let value = Vector3::from(value.unwrap_or_default());
         at_most(value.norm(), most, &path(name))?;
         Ok(value / 1e6)
     };
-    let translation = || vector("translation_um", file.translation_um, 5e4);
-    let rotation = || vector("rotation_urad", file.rotation_urad, 5e4);
-    let within_one = |name: &str, value: Option<f64>| given(name, value, not_negative, 1.0);
-    let moves = file.moves.unwrap_or_default();
-    let effect = match kind.kind {
-        "joint_compliance" => Effect::JointCompliance { joint: at, stiffness: stiffness()? },
-        "link_bending" => Effect::LinkBending { link: at, compliance: compliance()? },
-        "backlash" => Effect::Backlash { joint: at, width: width()? },
-        "gravity_lost_motion" => Effect::GravityLostMotion { joint: at, width: width()? },
-        "joint_eccentricity" => {
-            let order = file.order.unwrap_or(1);
-            if !(1..=2).contains(&order) {
-                return Err(Invalid::new(
-                    path("order"),
-                    order.to_string(),
-                    "1 or 2",
-                    "an encoder off its axis has 1, a tilted one 2",
-                ));
-            }
-            Effect::JointEccentricity { joint: at, amplitude: amplitude()?, order, phase }
+    let order = file.order.unwrap_or(1);
+    if !(1..=2).contains(&order) {
+        let remedy = "an encoder off its axis has 1, a tilted one 2";
+        return Err(Invalid::new(path("order"), order.to_string(), "1 or 2", remedy));
+    }
+    let at = place.unwrap_or(0);
+    let source = match (&file.source, file.coupling_urad_per_rad) {
+        (Some(name), _) => source(name, at, &path("source"), arm)?,
+        (None, None) => at,
+        (None, Some(_)) => {
+            let remedy = "name the joint whose motion leaks: source = \"…\"";
+            return Err(Invalid::new(path("source"), "`source` is missing", "the name of a joint", remedy));
         }
-        "strain_wave_error" => {
-            let ratio = given("ratio", file.ratio, positive, 1e4)?;
-            Effect::StrainWaveError { joint: at, amplitude: amplitude()?, ratio, phase }
-        }
-        "gear_coupling" => {
-            let source = match (&file.source, file.coupling_urad_per_rad) {
-                (Some(name), _) => source(name, at, &path("source"), arm)?,
-                (None, None) => at,
-                (None, Some(_)) => {
-                    let remedy = "name the joint whose motion leaks: source = \"…\"";
-                    return Err(Invalid::new(path("source"), "`source` is missing", "the name of a joint", remedy));
-                }
-            };
-            let ratio_error = signed("ratio_error_urad_per_rad", file.ratio_error_urad_per_rad, 1e5)?;
-            let coupling = signed("coupling_urad_per_rad", file.coupling_urad_per_rad, 1e5)?;
-            Effect::GearCoupling { joint: at, ratio_error, coupling, source }
-        }
-        "link_thermal_growth" => return growth(file, &path("expansion_um_per_m_per_k"), place, arm),
-        "joint_thermal_drift" => {
-            Effect::JointThermalDrift { joint: at, drift: signed("drift_urad_per_k", file.drift_urad_per_k, 1e4)? }
-        }
-        "radial_clearance" | "tilt_clearance" | "clearance" => {
-            let axial = given("axial_um", file.axial_um, not_negative, LARGEST_SHIFT_UM)? / 1e6;
-            Effect::Clearance { joint: at, radial: radial()?, axial, tilt: tilt()? }
-        }
-        "base_drift" => Effect::BaseDrift { moves, translation: translation()?, rotation: rotation()? },
-        "base_step" => Effect::BaseStep {
-            moves,
-            translation: translation()?,
-            rotation: rotation()?,
-            after: within_one("after", file.after)?,
-        },
-        "tool_step" => {
-            Effect::ToolStep { translation: translation()?, rotation: rotation()?, after: within_one("after", file.after)? }
-        }
-        "measurement_scale" => Effect::MeasurementScale { scale: signed("scale_ppm", file.scale_ppm, 1e5)? },
-        "measurement_outliers" => Effect::MeasurementOutliers {
-            share: within_one("share", file.share)?,
-            factor: given("factor", file.factor, positive, 1e6)?,
-        },
-        "worn_tooth_sector" => Effect::WornToothSector {
-            joint: at,
-            depth: given("depth_arcsec", file.depth_arcsec, positive, LARGEST_TURN_ARCSEC)? * ARCSEC,
-            centre: file.centre_deg.unwrap_or(0.0).to_radians(),
-            half_width: given("half_width_deg", file.half_width_deg, positive, 180.0)?.to_radians(),
-        },
-        "creep_after_motion" => Effect::CreepAfterMotion {
-            joint: at,
-            compliance: compliance()?,
-            time_constant: given("time_constant_s", file.time_constant_s, positive, 1e6)?,
-        },
-        "moment_crosstalk" => {
-            Effect::MomentCrosstalk { joint: at, gain: signed("gain_urad_per_nm", file.gain_urad_per_nm, 1e4)? }
-        }
-        "memory_hysteresis" => Effect::MemoryHysteresis {
-            joint: at,
-            amplitude: amplitude()?,
-            travel: given("travel_deg", file.travel_deg, positive, 36e3)?.to_radians(),
-        },
-        "wrong_payload" => {
-            let excess = file.excess_kg.unwrap_or(0.0);
-            at_most(excess.abs(), 1e3, &path("excess_kg"))?;
-            Effect::WrongPayload { excess, stiffness: stiffness()? }
-        }
-        _ => Effect::HardeningStiffness {
-            joint: at,
-            stiffness: stiffness()?,
-            cubic: given("cubic_nm_per_mrad3", file.cubic_nm_per_mrad3, not_negative, 1e9)? * 1e9,
-        },
     };
-    Ok(vec![effect])
+    Ok(Values {
+        stiffness: given("stiffness_nm_per_rad", file.stiffness_nm_per_rad, positive, 1e12)?,
+        cubic: given("cubic_nm_per_mrad3", file.cubic_nm_per_mrad3, not_negative, 1e9)? * 1e9,
+        compliance: given("compliance_urad_per_nm", file.compliance_urad_per_nm, positive, 1e4)? / 1e6,
+        beam: file.beam.unwrap_or(false),
+        gain: signed("gain_urad_per_nm", file.gain_urad_per_nm, 1e4)? / 1e6,
+        width: given("width_arcsec", file.width_arcsec, positive, LARGEST_TURN_ARCSEC)? * ARCSEC,
+        amplitude: given("amplitude_arcsec", file.amplitude_arcsec, positive, LARGEST_TURN_ARCSEC)? * ARCSEC,
+        order,
+        phase: file.phase_deg.unwrap_or(0.0).to_radians(),
+        ratio: given("ratio", file.ratio, positive, 1e4)?,
+        ratio_error: signed("ratio_error_urad_per_rad", file.ratio_error_urad_per_rad, 1e5)? / 1e6,
+        coupling: signed("coupling_urad_per_rad", file.coupling_urad_per_rad, 1e5)? / 1e6,
+        source,
+        // A list of them is read by itself.
+        expansion: 0.0,
+        drift: signed("drift_urad_per_k", file.drift_urad_per_k, 1e4)? / 1e6,
+        radial: given("radial_um", file.radial_um, not_negative, LARGEST_SHIFT_UM)? / 1e6,
+        axial: given("axial_um", file.axial_um, not_negative, LARGEST_SHIFT_UM)? / 1e6,
+        tilt: given("tilt_urad", file.tilt_urad, not_negative, LARGEST_TURN_URAD)? / 1e6,
+        moves: file.moves.unwrap_or_default(),
+        translation: vector("translation_um", file.translation_um, 5e4)?,
+        rotation: vector("rotation_urad", file.rotation_urad, 5e4)?,
+        after: given("after", file.after, not_negative, 1.0)?,
+        scale: signed("scale_ppm", file.scale_ppm, 1e5)? / 1e6,
+        share: given("share", file.share, not_negative, 1.0)?,
+        factor: given("factor", file.factor, positive, 1e6)?,
+        depth: given("depth_arcsec", file.depth_arcsec, positive, LARGEST_TURN_ARCSEC)? * ARCSEC,
+        centre: file.centre_deg.unwrap_or(0.0).to_radians(),
+        half_width: given("half_width_deg", file.half_width_deg, positive, 180.0)?.to_radians(),
+        time_constant: given("time_constant_s", file.time_constant_s, positive, 1e6)?,
+        travel: given("travel_deg", file.travel_deg, positive, 36e3)?.to_radians(),
+        excess: signed("excess_kg", file.excess_kg, 1e3)?,
+    })
 }
 
 /// Growth of the whole arm, of one link, or of each link by its own number.
@@ -279,7 +130,7 @@ fn growth(file: &EffectToml, key: &str, link: Option<usize>, arm: &Arm) -> Check
     for value in &each {
         at_most(not_negative(*value, key)?, 1e3, key)?;
     }
-    let grows = |link, expansion: f64| Effect::LinkThermalGrowth { link, expansion: expansion / 1e6 };
+    let grows = |link, expansion: f64| Effect::LinkThermalGrowth { of: Growing::of(link), expansion: expansion / 1e6 };
     if let OneOrEach::One(value) = values {
         return Ok(vec![grows(link, *value)]);
     }
@@ -289,32 +140,34 @@ fn growth(file: &EffectToml, key: &str, link: Option<usize>, arm: &Arm) -> Check
     Ok(std::iter::once(grows(None, foot)).chain(more).collect())
 }
 
-/// The joint or link that the effect sits on.
-fn place(file: &EffectToml, kind: &KindKeys, key: &str, arm: &Arm) -> Checked<Option<usize>> {
+/// The joint or link that an effect of kind `name` sits on.
+fn place(file: &EffectToml, name: &str, keys: &SceneKeys, key: &str, arm: &Arm) -> Checked<Option<usize>> {
     let missing = |name: &str, what: &str| {
         let (found, remedy) = (format!("`{name}` is missing"), format!("add `{name} = \"…\"`"));
         Err(Invalid::new(format!("{key}.{name}"), found, format!("the name of a {what}"), remedy))
     };
-    match kind.place {
-        Place::Nowhere => Ok(None),
-        Place::Joint | Place::TurningJoint => {
-            let Some(name) = &file.joint else {
-                return missing("joint", "joint");
+    let turning = match keys.place {
+        ScenePlace::Nowhere => return Ok(None),
+        ScenePlace::Link | ScenePlace::LinkOrArm => {
+            return match &file.link {
+                Some(name) => link(name, &format!("{key}.link"), arm).map(Some),
+                None if keys.place == ScenePlace::LinkOrArm => Ok(None),
+                None => missing("link", "link"),
             };
-            let path = format!("{key}.joint");
-            let joint = joint(name, &path, arm)?;
-            if kind.place == Place::TurningJoint && arm.chain.joints[joint].kind != JointKind::Revolute {
-                let found = format!("{name:?}, which slides");
-                return Err(Invalid::new(path, found, format!("a joint that turns for {}", kind.kind), "name another joint"));
-            }
-            Ok(Some(joint))
         }
-        Place::Link | Place::LinkOrArm => match &file.link {
-            Some(name) => link(name, &format!("{key}.link"), arm).map(Some),
-            None if kind.place == Place::LinkOrArm => Ok(None),
-            None => missing("link", "link"),
-        },
+        ScenePlace::Joint => false,
+        ScenePlace::TurningJoint => true,
+    };
+    let Some(joint_name) = &file.joint else {
+        return missing("joint", "joint");
+    };
+    let path = format!("{key}.joint");
+    let joint = joint(joint_name, &path, arm)?;
+    if turning && arm.chain.joints[joint].kind != JointKind::Revolute {
+        let found = format!("{joint_name:?}, which slides");
+        return Err(Invalid::new(path, found, format!("a joint that turns for {name}"), "name another joint"));
     }
+    Ok(Some(joint))
 }
 
 fn joint(name: &str, key: &str, arm: &Arm) -> Checked<usize> {
@@ -350,30 +203,26 @@ fn named(name: &str, names: &[&str], key: &str, what: &str) -> Checked<usize> {
 }
 
 /// Refuses keys that belong to other kinds, and missing ones.
-fn check_keys(file: &EffectToml, kind: &KindKeys, key: &str) -> Checked<()> {
+fn check_keys(file: &EffectToml, name: &str, keys: &SceneKeys, key: &str) -> Checked<()> {
     let table = toml::Value::try_from(file).ok();
     let given: Vec<&str> = table
         .as_ref()
         .and_then(toml::Value::as_table)
         .map(|table| table.keys().map(String::as_str).collect())
         .unwrap_or_default();
-    let place: &[&str] = match kind.place {
-        Place::TurningJoint | Place::Joint => &["joint"],
-        Place::Link | Place::LinkOrArm => &["link"],
-        Place::Nowhere => &[],
-    };
-    let allowed: Vec<&str> = ["kind"].iter().chain(place).chain(kind.required).chain(kind.optional).copied().collect();
-    if let Some(foreign) = given.iter().find(|name| !allowed.contains(name)) {
-        let found = format!("`{foreign}`, which {} does not have", kind.kind);
+    let allowed: Vec<&str> =
+        ["kind"].into_iter().chain(keys.place_key()).chain(keys.required.iter().chain(keys.optional).copied()).collect();
+    if let Some(foreign) = given.iter().find(|other| !allowed.contains(other)) {
+        let found = format!("`{foreign}`, which {name} does not have");
         let remedy = suggestion(foreign, &allowed).unwrap_or_else(|| "remove the key, or change the kind".to_owned());
         return Err(Invalid::new(format!("{key}.{foreign}"), found, allowed.join(", "), remedy));
     }
-    if let Some(missing) = kind.required.iter().find(|name| !given.contains(name)) {
+    if let Some(missing) = keys.required.iter().find(|needed| !given.contains(needed)) {
         let (found, remedy) = (format!("`{missing}` is missing"), format!("add `{missing} = …`"));
-        return Err(Invalid::new(key, found, format!("{} needs {}", kind.kind, kind.required.join(", ")), remedy));
+        return Err(Invalid::new(key, found, format!("{name} needs {}", keys.required.join(", ")), remedy));
     }
-    if kind.required.is_empty() && !kind.optional.iter().any(|name| given.contains(name)) {
-        let allowed = format!("at least one of {}", kind.optional.join(", "));
+    if keys.required.is_empty() && !keys.optional.iter().any(|other| given.contains(other)) {
+        let allowed = format!("at least one of {}", keys.optional.join(", "));
         return Err(Invalid::new(key, "no magnitude", allowed, "say how large it is"));
     }
     Ok(())

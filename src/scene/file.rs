@@ -558,7 +558,7 @@ pub struct ParametersToml {
 }
 
 /// `[[injected.effect]]`: something that is wrong with arm, cell or sensor besides the parameters. Which keys belong to which kind is
-/// written in [`super::effect_file::KINDS`], which `kincal effects` prints.
+/// written in the table of kinds ([`crate::effects::Kind::descriptor`]), which `kincal effects` prints.
 #[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EffectToml {
@@ -588,6 +588,9 @@ pub struct EffectToml {
     /// µrad per N·m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub compliance_urad_per_nm: Option<f64>,
+    /// Whether the link bends as a slender beam from its joint to the next. Default: false.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beam: Option<bool>,
     /// µrad per N·m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain_urad_per_nm: Option<f64>,

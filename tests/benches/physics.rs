@@ -5,7 +5,7 @@ use kincal::arm::mdh::{Frame, chain};
 use kincal::arm::{Arm, Inertial, Link};
 use kincal::arm::{Joint, JointKind};
 use kincal::seed::stream;
-use kincal::simulation::effect::{Effect, Moves};
+use kincal::simulation::effect::{Effect, Foot, Growing, Moves};
 use kincal::simulation::physics::{Conditions, PhysicalArm, Settling, Start, Stop};
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -49,7 +49,7 @@ const POSES: usize = 100;
 
 fn settle(bencher: Bencher, joints_with_clearance: usize, start: Start) {
     let arm = arm();
-    let clearance = |joint| Effect::Clearance { joint, radial: 30e-6, axial: 20e-6, tilt: 100e-6 };
+    let clearance = |joint| Effect::Clearance { joint, radial: 30e-6, axial: 20e-6, tilt: 100e-6, held: None };
     let effects: Vec<Effect> = (0..joints_with_clearance).map(clearance).collect();
     let mut physical =
         PhysicalArm::new(&arm, &arm.chain.nominal(), &effects, Settling { start, ..Settling::default() }).expect("a valid arm");
@@ -66,7 +66,7 @@ fn effect(name: &str) -> Effect {
     let shift = Vector3::new(3e-5, -2e-5, 1e-5);
     match name {
         "spring" => Effect::JointCompliance { joint, stiffness: 3e4 },
-        "bending" => Effect::LinkBending { link: joint, compliance: 2e-5 },
+        "bending" => Effect::LinkBending { link: joint, compliance: 2e-5, beam: false },
         "hardening" => Effect::HardeningStiffness { joint, stiffness: 2e4, cubic: 5e8 },
         "creep" => Effect::CreepAfterMotion { joint, compliance: 1e-5, time_constant: 60.0 },
         "backlash" => Effect::Backlash { joint, width: 3e-4 },
@@ -74,7 +74,7 @@ fn effect(name: &str) -> Effect {
         "drive train" => Effect::JointEccentricity { joint, amplitude: 2e-4, order: 1, phase: 0.3 },
         "memory" => Effect::MemoryHysteresis { joint, amplitude: 3e-4, travel: 0.1 },
         "crosstalk" => Effect::MomentCrosstalk { joint, gain: 3e-6 },
-        "growth" => Effect::LinkThermalGrowth { link: None, expansion: 2e-5 },
+        "growth" => Effect::LinkThermalGrowth { of: Growing::Arm(Foot::Own), expansion: 2e-5 },
         "step" => Effect::BaseStep { moves: Moves::Base, translation: shift, rotation: shift, after: 0.5 },
         _ => Effect::WrongPayload { excess: 1.0, stiffness: 2e4 },
     }

@@ -6,7 +6,6 @@ use std::path::Path;
 use kincal::effects::Kind;
 use kincal::lab::challenge::verdict::oracle;
 use kincal::lab::challenge::{Folder, Options, case};
-use kincal::lab::injection::Sort;
 use kincal::lab::reproduce::arms::arm8;
 use kincal::simulation::effect::Effect;
 use serde_json::Value;
@@ -96,7 +95,7 @@ fn the_same_poses_from_two_truths_are_the_same_file() {
         // Another truth in words, the same in deed: an effect more, which none of the readings has.
         let mut other = case::hidden(&public, &options, &key, index);
         other.injected.effects.push(Effect::MeasurementOutliers { share: 0.0, factor: 9.0 });
-        other.sorts.push(Sort::Known(Kind::MeasurementOutliers));
+        other.kinds.push(Kind::MeasurementOutliers);
         other.noise.factor = 7.0;
         let [a, b] = [&one, &other].map(|hidden| case::measured(&public, hidden, index).unwrap());
         assert_eq!((a.1.effects.len(), b.1.effects.len()), (1, 2));

@@ -177,4 +177,10 @@ impl Posture {
         let force = self.forces[joint];
         force - self.axes[joint] * self.axes[joint].dot(&force)
     }
+
+    /// The x and y axes of the frame that moves with `joint`.
+    #[must_use]
+    pub fn across_link(&self, joint: usize) -> [Vector3<f64>; 2] {
+        [0, 1].map(|axis| self.frames[joint].column(axis).into())
+    }
 }

@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 use super::folder::ChallengeError;
 use crate::design::candidates::{Rules, Sampler};
 use crate::design::search::split;
-use crate::effects::Location;
+use crate::effects::{Kind, Location};
 use crate::event::{Event, Start};
 use crate::lab::conditions::course;
 use crate::lab::detectability::{difference, geometry_of_cell, has_signal, noiseless, without};
-use crate::lab::injection::{Sort, magnitude};
+use crate::lab::injection::places;
 use crate::measurement::Measurement;
 use crate::progress::{Progress as _, Silent};
 use crate::recording::write::Recorder;
@@ -155,8 +155,8 @@ pub struct Public {
 pub struct Hidden {
     /// For the cell.
     pub injected: Injected,
-    /// Sorts of the effects, in their order.
-    pub sorts: Vec<Sort>,
+    /// Kinds of the effects, in their order; heavy tails of the noise are none of them.
+    pub kinds: Vec<Kind>,
     /// The noise.
     pub noise: TrueNoise,
 }
@@ -239,20 +239,20 @@ pub fn hidden(public: &Public, options: &Options, key: &[u8; 32], index: usize) 
     let count = if without_effect { 0 } else { fewest + stream.index(most.max(fewest) - fewest + 1) };
     let which = stream.unit();
     let arm = &public.file.scene.arm;
-    let kinds: Vec<Sort> = options.kinds.iter().filter_map(|name| Sort::from_name(name)).collect();
-    let (mut sorts, mut effects): (Vec<Sort>, Vec<Effect>) = (Vec::new(), Vec::new());
+    let choice: Vec<Kind> = options.kinds.iter().filter_map(|name| Kind::from_name(name)).collect();
+    let (mut kinds, mut effects): (Vec<Kind>, Vec<Effect>) = (Vec::new(), Vec::new());
     while effects.len() < count {
-        let sort = kinds[stream.index(kinds.len())];
-        let places = sort.places(arm);
+        let kind = choice[stream.index(choice.len())];
+        let places = places(kind, arm);
         let place = places[stream.index(places.len())];
-        let [low, high] = sort.range(place, arm);
+        let [low, high] = kind.range(place, arm.joint_count());
         let magnitude = low * libm::pow(high / low, stream.unit());
-        let effect = sort.effect(place, magnitude, arm, &mut stream);
+        let effect = Effect::drawn(kind, place, magnitude, arm, &mut stream);
         // The same twice would be one of another size; there may be too few others.
         let there = |other: &Effect| other.name() == effect.name() && other.location() == effect.location();
-        let others = kinds.iter().map(|sort| sort.places(arm).len()).sum::<usize>();
+        let others = choice.iter().map(|kind| self::places(*kind, arm).len()).sum::<usize>();
         if !effects.iter().any(there) || effects.len() >= others {
-            sorts.push(sort);
+            kinds.push(kind);
             effects.push(effect);
         }
     }
@@ -271,7 +271,7 @@ pub fn hidden(public: &Public, options: &Options, key: &[u8; 32], index: usize) 
         noise: Noise::Declared { factor },
     };
     let declared_m = public.file.scene.sensor.position_sigma_m;
-    Hidden { injected, sorts, noise: TrueNoise { declared_m, factor, tails } }
+    Hidden { injected, kinds, noise: TrueNoise { declared_m, factor, tails } }
 }
 
 /// Measures the case, and finds how much of its effects can be seen.
@@ -284,15 +284,15 @@ pub fn measured(public: &Public, hidden: &Hidden, index: usize) -> Result<(Vec<M
         measure(&scene.cell(), injected, planned, planned.len(), &mut Silent).map_err(SessionError::from)?;
     let values: Vec<f64> = truth.parameters.iter().map(|parameter| parameter.true_value).collect();
     let mut effects: Vec<TrueEffect> = hidden
-        .sorts
+        .kinds
         .iter()
         .zip(&injected.effects)
-        .map(|(sort, effect)| TrueEffect {
-            kind: sort.name().to_owned(),
-            known: matches!(sort, Sort::Known(_)),
+        .map(|(kind, effect)| TrueEffect {
+            kind: kind.name().to_owned(),
+            known: kind.descriptor().known,
             location: effect.location(),
-            magnitude: magnitude(effect, effect.kinds().first().copied()),
-            unit: sort.unit().to_owned(),
+            magnitude: effect.magnitude(Some(*kind)),
+            unit: kind.unit().to_owned(),
             lambda: None,
             signal: None,
             after: match effect {
@@ -303,7 +303,7 @@ pub fn measured(public: &Public, hidden: &Hidden, index: usize) -> Result<(Vec<M
         })
         .collect();
     let mut lambda = None;
-    if hidden.sorts.iter().zip(&injected.effects).any(|(_, effect)| has_signal(effect)) {
+    if hidden.kinds.iter().zip(&injected.effects).any(|(_, effect)| has_signal(effect)) {
         let joints: Vec<&[f64]> = planned.iter().map(|planned| planned.joints.as_slice()).collect();
         let geometry = geometry_of_cell(&scene.arm, &values, &scene.sensor, &joints);
         let poses = |injected: &Injected| noiseless(scene, injected, planned).map_err(SessionError::from);
@@ -312,7 +312,7 @@ pub fn measured(public: &Public, hidden: &Hidden, index: usize) -> Result<(Vec<M
         lambda = Some(geometry.surviving(&difference(&all, &none)).lambda);
         for (position, effect) in effects.iter_mut().enumerate() {
             if has_signal(&injected.effects[position]) {
-                let other = if hidden.sorts.len() == 1 { none.clone() } else { poses(&without(injected, position))? };
+                let other = if hidden.kinds.len() == 1 { none.clone() } else { poses(&without(injected, position))? };
                 let surviving = geometry.surviving(&difference(&all, &other));
                 (effect.lambda, effect.signal) = (Some(surviving.lambda), Some(surviving.signal));
             }

@@ -11,7 +11,6 @@ use super::folder::ChallengeError;
 use crate::diagnosis::outcome::{Diagnosis, NoiseSource, Place};
 use crate::diagnosis::{Options as DiagnosisOptions, diagnose};
 use crate::effects::Kind;
-use crate::lab::injection::Sort;
 use crate::lab::reproduce::bench::Watcher;
 use crate::progress::Silent;
 use crate::scene::SceneFile;
@@ -143,7 +142,7 @@ pub fn check(base: &SceneFile, options: &Options, watcher: &dyn Watcher) -> Resu
             let place = curve.location.index.map(|index| index - 1);
             let label = format!("power/{}/{place:?}/{level}/{trial}", curve.kind.name());
             let arm = &public.file.scene.arm;
-            let effect = Sort::Known(curve.kind).effect(place, size, arm, &mut hidden_stream(&key, &label));
+            let effect = Effect::drawn(curve.kind, place, size, arm, &mut hidden_stream(&key, &label));
             let found = cell(&public, vec![effect], &injected_key(&key, &label))?;
             watcher.step();
             Ok(judged(&found, curve))
@@ -208,7 +207,7 @@ fn cell(public: &Public, effects: Vec<Effect>, key: &str) -> Result<Diagnosis, C
 fn stated(kind: Kind, place: Option<usize>, quiet: &[Diagnosis]) -> Option<Curve> {
     let value = |diagnosis: &Diagnosis, location: &Place| {
         let same = |entry: &&crate::diagnosis::outcome::Undetectable| {
-            entry.kind == kind.name() && (entry.location.level, entry.location.index) == (location.level, location.index)
+            entry.kind == kind && (entry.location.level, entry.location.index) == (location.level, location.index)
         };
         let entry = diagnosis.detectable.iter().chain(&diagnosis.undetectable).find(same);
         entry.and_then(|entry| entry.minimum_detectable.value)
@@ -218,7 +217,7 @@ fn stated(kind: Kind, place: Option<usize>, quiet: &[Diagnosis]) -> Option<Curve
         Some(place) => Place { level: kind.level(), index: Some(place + 1), time_s: None },
         None => {
             let of_kind = |list: &[crate::diagnosis::outcome::Undetectable]| {
-                list.iter().filter(|entry| entry.kind == kind.name()).cloned().collect::<Vec<_>>()
+                list.iter().filter(|entry| entry.kind == kind).cloned().collect::<Vec<_>>()
             };
             let mut shown = of_kind(&first.detectable);
             if shown.is_empty() {
@@ -255,13 +254,13 @@ struct Judged {
 
 fn judged(found: &Diagnosis, curve: &Curve) -> Judged {
     let is = |effect: &crate::diagnosis::outcome::Effect| {
-        effect.kind == curve.kind.name()
+        effect.kind == curve.kind
             && (effect.location.level, effect.location.index) == (curve.location.level, curve.location.index)
     };
     let named = || found.effects.iter().filter(|effect| effect.probability >= NAMED);
     let name = |effect: &crate::diagnosis::outcome::Effect| match effect.location.index {
         Some(index) => format!("{} {index}", effect.kind),
-        None => effect.kind.clone(),
+        None => effect.kind.to_string(),
     };
     Judged {
         named: named().any(is),

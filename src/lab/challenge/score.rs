@@ -676,7 +676,7 @@ mod tests {
     fn effect(kind: &str, joint: usize, lambda: f64) -> TrueEffect {
         TrueEffect {
             kind: kind.to_owned(),
-            known: crate::effects::Kind::from_name(kind).is_some(),
+            known: crate::effects::Kind::known_from_name(kind).is_some(),
             location: Location { level: Level::Joint, index: Some(joint) },
             magnitude: 2e-5,
             unit: "m".to_owned(),

@@ -10,7 +10,7 @@ use super::arms::cut;
 use crate::measurement::Weights;
 use crate::measurement::{Sensor, View};
 use crate::scene::Scene;
-use crate::simulation::effect::Effect;
+use crate::simulation::effect::{Effect, Foot, Growing};
 use crate::simulation::injected::{Injected, Noise};
 use crate::simulation::plan::{Temperature, ThermalProfile};
 
@@ -85,10 +85,10 @@ impl Situation {
     #[must_use]
     pub fn injected(self, base: &Scene) -> Injected {
         let joints = base.arm.joint_count();
-        let clearance = |joint| Effect::Clearance { joint, radial: 30e-6, axial: 10e-6, tilt: 100e-6 };
+        let clearance = |joint| Effect::Clearance { joint, radial: 30e-6, axial: 10e-6, tilt: 100e-6, held: None };
         // The foot is of steel, the links of aluminium.
-        let foot = Effect::LinkThermalGrowth { link: None, expansion: 12e-6 };
-        let links = (0..joints).map(|link| Effect::LinkThermalGrowth { link: Some(link), expansion: 11e-6 });
+        let foot = Effect::LinkThermalGrowth { of: Growing::Arm(Foot::Own), expansion: 12e-6 };
+        let links = (0..joints).map(|link| Effect::LinkThermalGrowth { of: Growing::Link(link), expansion: 11e-6 });
         let play = [1, 3].into_iter().filter(|joint| *joint < joints).map(clearance);
         Injected {
             seed: "0f4d1c6be28a73955b1e90d7c3a64f82".to_owned(),

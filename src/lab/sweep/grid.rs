@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::arm::Arm;
 use crate::design::problem::Method;
-use crate::effects::Location;
+use crate::effects::{Kind, Location};
 use crate::lab::conditions::course;
-use crate::lab::injection::{self, Sort};
+use crate::lab::injection;
 use crate::simulation::plan::{ApproachPolicy, Plan};
 
 /// Name of a cell without an effect of its own.
@@ -69,14 +69,14 @@ impl Injecting {
         Injecting { effect: AS_THE_SCENE.to_owned(), ..Injecting::nothing() }
     }
 
-    /// Every magnitude (SI) of `sort` at every place (from 0); zero is no effect, and is there once.
+    /// Every magnitude (SI) of `kind` at every place (from 0); zero is no effect, and is there once.
     #[must_use]
-    pub fn all(sort: Sort, places: &[Option<usize>], magnitudes: &[f64]) -> Vec<Injecting> {
+    pub fn all(kind: Kind, places: &[Option<usize>], magnitudes: &[f64]) -> Vec<Injecting> {
         let none = magnitudes.contains(&0.0).then(Injecting::nothing);
         let some = places.iter().flat_map(|place| {
             magnitudes.iter().filter(|magnitude| **magnitude > 0.0).map(|magnitude| Injecting {
-                effect: sort.name().to_owned(),
-                location: Some(sort.location(*place)),
+                effect: kind.name().to_owned(),
+                location: Some(injection::location(kind, *place)),
                 magnitude: *magnitude,
             })
         });
@@ -129,7 +129,7 @@ impl Grid {
                                     effect: injecting.effect.clone(),
                                     location: injecting.location,
                                     magnitude: injecting.magnitude,
-                                    unit: Sort::from_name(&injecting.effect).map_or("", Sort::unit).to_owned(),
+                                    unit: Kind::from_name(&injecting.effect).map_or("", Kind::unit).to_owned(),
                                     poses,
                                     method,
                                     approach,
@@ -162,7 +162,7 @@ impl Cell {
     /// The magnitude with its unit, as it is printed.
     #[must_use]
     pub fn magnitude_written(&self) -> String {
-        Sort::from_name(&self.effect).map_or_else(|| "–".to_owned(), |sort| injection::written(self.magnitude, sort))
+        Kind::from_name(&self.effect).map_or_else(|| "–".to_owned(), |kind| injection::written(self.magnitude, kind))
     }
 
     /// The place, as it is printed.

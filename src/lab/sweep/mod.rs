@@ -19,10 +19,10 @@ use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 use super::detectability::{Geometry, difference, has_signal, noiseless};
-use super::injection::Sort;
 use crate::arm::frames::Pose;
 use crate::design;
 use crate::design::problem::Method;
+use crate::effects::Kind;
 use crate::identification::{fit_some, identify_on};
 use crate::lab::reproduce::bench::Watcher;
 use crate::measurement::{Measurement, Role};
@@ -33,6 +33,7 @@ use crate::seed::derive;
 use crate::session::SessionError;
 use crate::simulation::cell::plan::{Planned, plan};
 use crate::simulation::cell::{measure, truth};
+use crate::simulation::effect::Effect;
 use crate::simulation::injected::Injected;
 
 /// Trials of a thread from one flush to the next.
@@ -237,11 +238,11 @@ impl Sweep {
 
     /// What is injected without and with the cell's effect; without is absent where the cell has none of its own that could be seen.
     fn injected_of(&self, cell: &Cell, scene: &Scene) -> (Option<Injected>, Injected) {
-        match Sort::from_name(&cell.effect) {
-            Some(sort) => {
+        match Kind::from_name(&cell.effect) {
+            Some(kind) => {
                 let mut stream = truth::stream(&self.injected, scene.seed, "sweep/effect");
                 let place = cell.location.and_then(|location| location.index).map(|index| index - 1);
-                let effect = sort.effect(place, cell.magnitude, &scene.arm, &mut stream);
+                let effect = Effect::drawn(kind, place, cell.magnitude, &scene.arm, &mut stream);
                 let seen = has_signal(&effect);
                 let mut injected = self.injected.clone();
                 injected.effects.push(effect);

@@ -18,7 +18,14 @@ pub(super) enum Direction {
     AcrossX,
     /// About the y axis, turned with the bend about x.
     AcrossY,
+    /// As [`Direction::AcrossX`], but across a link that is a beam, at a point of [`BEAM_POINTS`].
+    AcrossBeamX { point: usize },
+    /// As [`Direction::AcrossY`], but across a link that is a beam, at a point of [`BEAM_POINTS`].
+    AcrossBeamY { point: usize },
 }
+
+/// Where a beam is hinged, as shares of its length: the points of Gauss's rule, 1/2 ∓ 1/(2 √3).
+pub(super) const BEAM_POINTS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 /// What holds it. Units per rad, or per m where the joint slides.
 #[derive(Clone, Copy, Debug, PartialEq)]

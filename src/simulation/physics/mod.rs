@@ -8,7 +8,7 @@
 //! | joint compliance | a free coordinate about the joint's axis with rapier's passive spring; the payload is a point mass in the multibody |
 //! | wrong payload | the same in every joint, the springs relaxed where a servo that knows the believed payload would put them |
 //! | hardening stiffness | the same with the tangent of its spring, renewed every step |
-//! | link bending | two springs across the axis (a Cardan joint) at the joint, outboard of its motion |
+//! | link bending | two springs across the axis (a Cardan joint) at the joint, outboard of its motion; of a beam, two such pairs along it |
 //! | creep | a spring and a damper beside it, stepped exactly over each stop of the session |
 //! | backlash | output between two stops of the motor's, held by rapier's friction; the last of the move is driven |
 //! | gravity lost motion, clearances | free, limited coordinates that gravity seats |
@@ -40,7 +40,7 @@ mod convert;
 mod coordinate;
 mod drive_train;
 pub mod error;
-mod mechanisms;
+mod mechanism;
 pub mod physical_arm;
 mod play;
 pub mod settling;

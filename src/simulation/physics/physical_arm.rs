@@ -88,7 +88,7 @@ impl PhysicalArm {
         }
         let mut loads = self.world.loads();
         let mut turning = self.world.coordinate_loads();
-        let decisions = self.arm.decisions(&loads);
+        let decisions = self.arm.decisions(&loads, placement.payload_kg);
         let by = self.decided(&turning);
         let friction = self.friction(&turning);
         let mut task = Task {
@@ -319,6 +319,7 @@ mod tests {
     use crate::arm::JointKind;
     use crate::arm::frames::pose_error;
     use crate::seed::{Stream, stream};
+    use crate::simulation::effect::{Foot, Growing};
     use nalgebra::{Translation3, Vector2};
 
     /// Expansion of every link in these tests, 1/K.
@@ -326,12 +327,13 @@ mod tests {
 
     /// Clearances of the joints, and links that grow.
     fn effects(clearances: &[Clearance]) -> Vec<Effect> {
-        let growth = [Effect::LinkThermalGrowth { link: None, expansion: EXPANSION }];
+        let growth = [Effect::LinkThermalGrowth { of: Growing::Arm(Foot::Own), expansion: EXPANSION }];
         let of = |(joint, clearance): (usize, &Clearance)| Effect::Clearance {
             joint,
             radial: clearance.radial_m,
             axial: clearance.axial_m,
             tilt: clearance.tilt_rad,
+            held: None,
         };
         growth.into_iter().chain(clearances.iter().enumerate().map(of)).collect()
     }
@@ -446,7 +448,7 @@ mod tests {
                 // The oracle holds nothing: every load decides.
                 let oracle = TrueArm::new(&arm, &parameters, &effects(&clearances), 1e-12).unwrap();
                 let placed = placement(&oracle, &joints, &growth);
-                let all = oracle.decisions(&static_loads(&oracle, &placed, &[Play::CENTRE; 8]));
+                let all = oracle.decisions(&static_loads(&oracle, &placed, &[Play::CENTRE; 8]), placed.payload_kg);
                 let first = static_seats(&oracle, &placed, &all, 1);
                 let last = seats_about(&oracle, &placed, &all, &plays(&settled));
                 for (seat, (first, last)) in settled.seats.iter().zip(first.iter().zip(&last)) {

@@ -11,7 +11,7 @@ use crate::arm::Arm;
 use crate::arm::JointKind::{Prismatic, Revolute};
 use crate::arm::frames::pose_error;
 use crate::seed::stream;
-use crate::simulation::effect::{Effect, Moves};
+use crate::simulation::effect::{Effect, Foot, Growing, Moves};
 
 fn new(arm: &Arm, effects: &[Effect]) -> PhysicalArm {
     PhysicalArm::new(arm, &arm.chain.nominal(), effects, Settling::default()).unwrap()
@@ -119,15 +119,15 @@ fn everything() -> Vec<Effect> {
     let shift = Vector3::new(3e-5, -2e-5, 1e-5);
     vec![
         Effect::JointCompliance { joint: 1, stiffness: 3e4 },
-        Effect::LinkBending { link: 1, compliance: 2e-5 },
-        Effect::Clearance { joint: 1, radial: 30e-6, axial: 10e-6, tilt: 1e-4 },
+        Effect::LinkBending { link: 1, compliance: 2e-5, beam: false },
+        Effect::Clearance { joint: 1, radial: 30e-6, axial: 10e-6, tilt: 1e-4, held: None },
         Effect::Backlash { joint: 1, width: 3e-4 },
         Effect::GravityLostMotion { joint: 1, width: 2e-4 },
         Effect::JointEccentricity { joint: 2, amplitude: 2e-4, order: 1, phase: 0.3 },
         Effect::JointEccentricity { joint: 2, amplitude: 2e-4, order: 2, phase: -1.0 },
         Effect::StrainWaveError { joint: 3, amplitude: 1e-4, ratio: 100.0, phase: 0.1 },
         Effect::GearCoupling { joint: 4, ratio_error: 1e-4, coupling: 2e-4, source: 3 },
-        Effect::LinkThermalGrowth { link: None, expansion: 2e-5 },
+        Effect::LinkThermalGrowth { of: Growing::Arm(Foot::Own), expansion: 2e-5 },
         Effect::JointThermalDrift { joint: 5, drift: 1e-5 },
         Effect::BaseDrift { moves: Moves::Base, translation: shift, rotation: shift },
         Effect::BaseStep { moves: Moves::Base, translation: shift, rotation: shift, after: 0.5 },
@@ -174,7 +174,7 @@ fn without_a_load_what_yields_stays() {
     arm.gravity_in_base.fill(0.0);
     let effects = [
         Effect::JointCompliance { joint: 1, stiffness: 3e4 },
-        Effect::LinkBending { link: 2, compliance: 2e-5 },
+        Effect::LinkBending { link: 2, compliance: 2e-5, beam: false },
         Effect::GravityLostMotion { joint: 3, width: 2e-4 },
         Effect::HardeningStiffness { joint: 2, stiffness: 2e4, cubic: 5e8 },
         Effect::MomentCrosstalk { joint: 4, gain: 3e-6 },
@@ -198,7 +198,7 @@ fn effects_that_cannot_be_are_refused() {
         ),
         (Effect::JointCompliance { joint: 3, stiffness: 1e4 }, "joint_compliance is at joint number 4, but the arm has 3 joints"),
         (
-            Effect::LinkBending { link: 1, compliance: 0.0 },
+            Effect::LinkBending { link: 1, compliance: 0.0, beam: false },
             "the compliance of link_bending at link 2 is 0, expected between 1e-12 and 0.01 (rad/(N·m), m/N)",
         ),
         (
@@ -226,7 +226,7 @@ fn effects_that_cannot_be_are_refused() {
             "the translation of base_step at the base is NaN, expected between -0.1 and 0.1",
         ),
         (
-            Effect::LinkThermalGrowth { link: None, expansion: 1.0 },
+            Effect::LinkThermalGrowth { of: Growing::Arm(Foot::Own), expansion: 1.0 },
             "the expansion of link_thermal_growth at all links is 1, expected between -0.001 and 0.001 (1/K)",
         ),
         (
@@ -243,7 +243,7 @@ fn effects_that_cannot_be_are_refused() {
 fn clearances_of_one_joint_add_up() {
     let arm = test_arms::eight();
     let joints = [0.3, 0.8, -0.5, 1.0, 0.2, -0.4, 0.1, 0.6];
-    let clearance = |radial, tilt| Effect::Clearance { joint: 2, radial, axial: 0.0, tilt };
+    let clearance = |radial, tilt| Effect::Clearance { joint: 2, radial, axial: 0.0, tilt, held: None };
     let settle = |effects: &[Effect]| new(&arm, effects).settle(&Conditions::still(&joints, &[0.0; 9])).base_from_tool;
     let (once, twice) = (settle(&[clearance(30e-6, 1e-4)]), settle(&[clearance(30e-6, 0.0), clearance(0.0, 1e-4)]));
     assert_eq!(once, twice);

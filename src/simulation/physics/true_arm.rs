@@ -1,13 +1,13 @@
 //! The true arm in plain numbers: what both the multibody and the static seat are made of.
 
-use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::clearance::{Clearance, SeatedBy};
 use super::conditions::Conditions;
-use super::coordinate::Coordinate;
+use super::coordinate::{BEAM_POINTS, Coordinate, Direction};
 use super::drive_train::Drive;
 use super::error::PhysicsError;
-use super::mechanisms::{Mechanisms, Shift, shifted};
+use super::mechanism::{Held, Mechanisms, Shift, shifted};
 use super::play::{Decision, Load};
 use crate::arm::frames::Pose;
 use crate::arm::{Arm, Inertial};
@@ -23,12 +23,15 @@ pub(super) struct TrueArm {
     pub(super) kinds: Vec<JointKind>,
     /// Play of each joint.
     pub(super) clearances: Vec<Clearance>,
+    held: Vec<Held>,
     /// Drive train of each joint.
     pub(super) drives: Vec<Drive>,
     /// Coordinates that yield, from the base outwards.
     pub(super) coordinates: Vec<Coordinate>,
     /// Expansion of each link, base link first, 1/K.
     expansion_per_k: Vec<f64>,
+    /// Expansion of the base link with the temperature of the first link that moves, 1/K.
+    foot_expansion_with_first_link_per_k: f64,
     base_shifts: Vec<Shift>,
     tool_shifts: Vec<Shift>,
     /// Mass that the tool carries beyond what is believed, kg.
@@ -42,7 +45,9 @@ pub(super) struct TrueArm {
     /// Pose of the base link's frame in the chain's first frame.
     pub(super) base_from_base_link: Pose,
     /// Below these loads a joint's coordinates do not move.
-    pub(super) holding: Vec<Holding>,
+    holding: Vec<Holding>,
+    /// Weight of the arm outboard of each joint, N, and its length, m.
+    outboard: Vec<[f64; 2]>,
 }
 
 /// Where an arm is to be, but for what yields.
@@ -75,6 +80,9 @@ const SMALLEST_HOLDING: f64 = 1e-9;
 /// Threshold of gravity-seated lost motion over the friction of the fits.
 const LOST_MOTION_SHARE: f64 = 2e-3;
 
+/// A link that is shorter is no beam, m.
+const SHORTEST_BEAM_M: f64 = 1e-3;
+
 impl TrueArm {
     pub(super) fn new(arm: &Arm, parameters_true: &[f64], effects: &[Effect], holding_ratio: f64) -> Result<Self, PhysicsError> {
         let count = arm.joint_count();
@@ -97,23 +105,29 @@ impl TrueArm {
         let base_from_base_link = base.map_or_else(Pose::identity, |index| at.frames(&vec![0.0; count])[index]);
         let segments = at.segments();
         let gravity = arm.gravity_in_base.norm();
-        let holding = (0..count)
+        let outboard: Vec<[f64; 2]> = (0..count)
             .map(|joint| {
                 let weight = gravity * inertials[joint..].iter().map(|inertial| inertial.mass_kg).sum::<f64>();
                 let reach: f64 = segments[joint + 1..].iter().map(|segment| segment.translation.vector.norm()).sum();
-                Holding {
-                    force: (holding_ratio * weight).max(SMALLEST_HOLDING),
-                    moment: (holding_ratio * weight * reach).max(SMALLEST_HOLDING),
-                }
+                [weight, reach]
+            })
+            .collect();
+        let holding = outboard
+            .iter()
+            .map(|[weight, reach]| Holding {
+                force: (holding_ratio * weight).max(SMALLEST_HOLDING),
+                moment: (holding_ratio * weight * reach).max(SMALLEST_HOLDING),
             })
             .collect();
         Ok(TrueArm {
             segments,
             kinds,
             clearances: parts.clearances,
+            held: parts.held,
             drives: parts.drives,
             coordinates: parts.coordinates,
             expansion_per_k: parts.expansion_per_k,
+            foot_expansion_with_first_link_per_k: parts.foot_expansion_with_first_link_per_k,
             base_shifts: parts.base_shifts,
             tool_shifts: parts.tool_shifts,
             excess_kg: parts.excess_kg,
@@ -122,6 +136,7 @@ impl TrueArm {
             gravity_in_base: arm.gravity_in_base,
             base_from_base_link,
             holding,
+            outboard,
         })
     }
 
@@ -134,11 +149,53 @@ impl TrueArm {
         let share = conditions.share();
         Placement {
             joints: self.drives.iter().enumerate().map(|(joint, drive)| drive.output(joint, conditions)).collect(),
-            growth: self.expansion_per_k.iter().zip(conditions.rise_k).map(|(per_k, rise)| 1.0 + per_k * rise).collect(),
+            growth: self.growth(conditions.rise_k),
             base_shift: shifted(&self.base_shifts, share),
             tool_shift: shifted(&self.tool_shifts, share),
             // Less than nothing hangs on no tool.
             payload_kg: (conditions.payload_kg + self.excess_kg).max(0.0),
+        }
+    }
+
+    /// Growth of each segment where the links are warmer by `rise_k`, base link first.
+    fn growth(&self, rise_k: &[f64]) -> Vec<f64> {
+        let mut growth: Vec<f64> = self.expansion_per_k.iter().zip(rise_k).map(|(per_k, rise)| 1.0 + per_k * rise).collect();
+        growth[0] += self.foot_expansion_with_first_link_per_k * rise_k[1];
+        growth
+    }
+
+    /// Where the hinge of `coordinate` is, seen from the frame after its joint's motion.
+    pub(super) fn hinge(&self, coordinate: &Coordinate, placement: &Placement) -> Pose {
+        let point = match coordinate.direction {
+            Direction::Joint | Direction::AcrossX | Direction::AcrossY => return Pose::identity(),
+            Direction::AcrossBeamX { point } | Direction::AcrossBeamY { point } => point,
+        };
+        // From the joint's origin, which does not slide with it, to the next one's.
+        let start = match self.kinds[coordinate.joint] {
+            JointKind::Revolute => Vector3::zeros(),
+            JointKind::Prismatic => -Vector3::z() * placement.joints[coordinate.joint],
+        };
+        let along = self.segment(coordinate.joint + 1, placement).translation.vector - start;
+        let length = along.norm();
+        // Too short to have a direction: a hinge at the joint.
+        if length < SHORTEST_BEAM_M {
+            return Pose::identity();
+        }
+        let z = along / length;
+        let x = z.cross(&if z.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() }).normalize();
+        let axes = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, z.cross(&x), z]));
+        Pose::from_parts(Translation3::from(start + along * BEAM_POINTS[point]), UnitQuaternion::from_rotation_matrix(&axes))
+    }
+
+    /// Loads below which friction keeps the play of joint `joint` in its middle, with a payload on the tool.
+    pub(super) fn fit_holding(&self, joint: usize, payload_kg: f64) -> Holding {
+        let [weight, reach] = self.outboard[joint];
+        let all = weight + self.gravity_in_base.norm() * payload_kg;
+        let Held { force, moment } = self.held[joint];
+        let usual = self.holding[joint];
+        Holding {
+            force: force.map_or(usual.force, |share| (share * all).max(SMALLEST_HOLDING)),
+            moment: moment.map_or(usual.moment, |share| (share * all * reach).max(SMALLEST_HOLDING)),
         }
     }
 
@@ -182,8 +239,8 @@ impl TrueArm {
         }
     }
 
-    /// What decides the coordinates of each joint's play under the loads `loads`.
-    pub(super) fn decisions(&self, loads: &[Load]) -> Vec<Decision> {
+    /// What decides the coordinates of each joint's play under the loads `loads`, with a payload on the tool.
+    pub(super) fn decisions(&self, loads: &[Load], payload_kg: f64) -> Vec<Decision> {
         let by = |clearance: f64, load: f64, holding: f64| {
             if clearance == 0.0 {
                 SeatedBy::Fit
@@ -193,9 +250,10 @@ impl TrueArm {
                 SeatedBy::Friction
             }
         };
-        let joints = self.clearances.iter().zip(&self.holding).zip(loads);
+        let joints = self.clearances.iter().zip(loads).enumerate();
         joints
-            .map(|((clearance, holding), load)| Decision {
+            .map(|(joint, (clearance, load))| (clearance, self.fit_holding(joint, payload_kg), load))
+            .map(|(clearance, holding, load)| Decision {
                 radial: by(clearance.radial_m, load.radial.norm(), holding.force),
                 axial: by(clearance.axial_m, load.axial.abs(), holding.force),
                 tilt: by(clearance.tilt_rad, load.tilt.norm(), holding.moment),

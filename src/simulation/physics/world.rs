@@ -230,7 +230,8 @@ impl World {
             for index in yielding.0..yielding.1 {
                 let YieldingLink { link, axis, .. } = self.yielding[index];
                 let hold = Some((axis, yielded.holds[index]));
-                self.set_link(link, &before, &Pose::identity(), &[yielded.coordinates[index]], hold);
+                let hinge = arm.hinge(&arm.coordinates[index], placement);
+                self.set_link(link, &(before * hinge), &hinge.inverse(), &[yielded.coordinates[index]], hold);
                 before = Pose::identity();
             }
             if slide.is_none() && lean.is_none() && yielding.0 == yielding.1 {
@@ -368,7 +369,7 @@ impl World {
             if by == SeatedBy::Load { across(load.max(0.5 * holding)) } else { HELD * across(holding) }
         };
         for (joint, load) in loads.iter().enumerate() {
-            let (clearance, holding, by) = (arm.clearances[joint], arm.holding[joint], decisions[joint]);
+            let (clearance, holding, by) = (arm.clearances[joint], arm.fit_holding(joint, self.payload_kg), decisions[joint]);
             let links = self.links[joint];
             let multibody = self.multibody_mut();
             let mut set = |coordinate: usize, damping: f64| multibody.damping_mut()[coordinate] = damping;
@@ -443,8 +444,8 @@ fn axis_of(coordinate: &Coordinate, kind: JointKind) -> JointAxis {
     match (coordinate.direction, kind) {
         (Direction::Joint, JointKind::Revolute) => JointAxis::AngZ,
         (Direction::Joint, JointKind::Prismatic) => JointAxis::LinZ,
-        (Direction::AcrossX, _) => JointAxis::AngX,
-        (Direction::AcrossY, _) => JointAxis::AngY,
+        (Direction::AcrossX | Direction::AcrossBeamX { .. }, _) => JointAxis::AngX,
+        (Direction::AcrossY | Direction::AcrossBeamY { .. }, _) => JointAxis::AngY,
     }
 }
 

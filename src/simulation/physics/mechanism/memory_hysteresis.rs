@@ -1,0 +1,13 @@
+//! Dahl's friction, exact for each straight move of the session.
+
+use super::{Checks, Mechanisms};
+use crate::simulation::physics::PhysicsError;
+use crate::simulation::physics::drive_train::Memory;
+
+pub(super) fn add(parts: &mut Mechanisms, checks: &Checks<'_>, joint: usize, memory: Memory) -> Result<(), PhysicsError> {
+    checks.exists("joint", joint)?;
+    checks.small("amplitude", memory.amplitude)?;
+    checks.positive("travel", memory.travel)?;
+    parts.drives[joint].memories.push(memory);
+    Ok(())
+}

@@ -1,0 +1,16 @@
+//! A gear train with a sector of worn teeth.
+
+use super::{Checks, Mechanisms};
+use crate::simulation::physics::PhysicsError;
+use crate::simulation::physics::drive_train::WornSector;
+
+pub(super) fn add(parts: &mut Mechanisms, checks: &Checks<'_>, joint: usize, sector: WornSector) -> Result<(), PhysicsError> {
+    checks.turns(joint)?;
+    checks.small("depth", sector.depth)?;
+    checks.finite("centre", sector.centre)?;
+    if !(sector.half_width > 0.0 && sector.half_width <= std::f64::consts::PI) {
+        return checks.bad("half width", sector.half_width, "more than 0 and at most π");
+    }
+    parts.drives[joint].worn.push(sector);
+    Ok(())
+}
