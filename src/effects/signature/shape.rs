@@ -92,7 +92,7 @@ pub enum Shape {
     /// \[1\] A link grows with its temperature; all, and the foot, where there is none.
     Growth {
         /// Link.
-        #[serde(with = "from_one_or_none")]
+        #[serde(default, skip_serializing_if = "Option::is_none", with = "from_one_or_none")]
         link: Option<usize>,
     },
     /// \[1\] All links grow with their temperatures, and the foot with that of the first link, or not at all.
