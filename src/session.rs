@@ -179,14 +179,7 @@ pub fn real_robot(start: &Start, real: &RealCell) -> Result<(Arm, Vec<String>), 
 #[must_use]
 pub fn real_sensor(real: &RealCell, measurements: &[Measurement]) -> Sensor {
     let orientation = measurements.iter().all(|measurement| measurement.orientation_xyzw.is_some());
-    Sensor {
-        position_in_base: nalgebra::Point3::origin(),
-        position_sigma_m: real.position_sigma_m,
-        position_sigma_per_m: 0.0,
-        orientation_sigma_rad: orientation.then_some(real.orientation_sigma_rad),
-        temperature_sigma_k: None,
-        view: None,
-    }
+    Sensor::uniform(real.position_sigma_m, orientation.then_some(real.orientation_sigma_rad))
 }
 
 /// Places the nominal robot `robot` in the measurement frame of `measurements`.

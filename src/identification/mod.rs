@@ -4,4 +4,5 @@ pub mod alignment;
 pub mod least_squares;
 pub mod outcome;
 
+pub use alignment::align;
 pub use least_squares::{IdentificationError, fit_some, identify, identify_on};

@@ -102,6 +102,20 @@ pub struct View {
 }
 
 impl Sensor {
+    /// A sensor that is equally exact everywhere and sees everything: position noise in m and orientation noise in rad, one sigma
+    /// per axis; `None` where it sees positions only.
+    #[must_use]
+    pub fn uniform(position_sigma_m: f64, orientation_sigma_rad: Option<f64>) -> Self {
+        Sensor {
+            position_in_base: Point3::origin(),
+            position_sigma_m,
+            position_sigma_per_m: 0.0,
+            orientation_sigma_rad,
+            temperature_sigma_k: None,
+            view: None,
+        }
+    }
+
     /// Sigma of a position reading at `position` (in base), m per axis.
     #[must_use]
     pub fn position_sigma_at(&self, position: &Vector3<f64>) -> f64 {

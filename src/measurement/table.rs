@@ -70,7 +70,8 @@ const ALLOWED: &str = "pose_id, time_s, q1_rad… (or _deg, _m, _mm), x_m, y_m, 
 ///
 /// # Errors
 /// If it cannot be read, or names the line and what is wrong with it.
-pub fn read(path: &Path) -> Result<Table, TableError> {
+pub fn read(path: impl AsRef<Path>) -> Result<Table, TableError> {
+    let path = path.as_ref();
     let file = path.display().to_string();
     let text = std::fs::read_to_string(path).map_err(|source| TableError::Unreadable { file: file.clone(), source })?;
     parse(&text, &file)

@@ -8,6 +8,7 @@ pub mod encode;
 pub mod read;
 pub mod tables;
 pub mod topic;
+#[cfg(feature = "simulator")]
 pub mod truth_file;
 pub mod write;
 

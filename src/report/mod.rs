@@ -1,11 +1,17 @@
 //! Results as tables and figures for people. Units are in the headers; machines get the same results as JSON.
 
+#[cfg(feature = "cli")]
 pub mod challenge;
+#[cfg(feature = "cli")]
 pub mod confirm;
 pub mod diagnosis;
+#[cfg(feature = "cli")]
 pub mod effects;
+#[cfg(feature = "cli")]
 pub mod findings;
+#[cfg(feature = "cli")]
 pub mod power;
+#[cfg(feature = "cli")]
 pub mod sweep;
 
 mod advice;
@@ -117,6 +123,7 @@ fn stop(reason: StopReason) -> &'static str {
 }
 
 /// How the poses settled in the simulator.
+#[cfg(feature = "simulator")]
 pub struct SettlingReport {
     /// Poses that settled within the tolerances.
     pub settled: usize,
@@ -125,6 +132,7 @@ pub struct SettlingReport {
 }
 
 /// Tells how the poses of a run settled.
+#[cfg(feature = "simulator")]
 #[must_use]
 pub fn settling(truth: &crate::simulation::cell::Truth) -> SettlingReport {
     let poses = &truth.poses;

@@ -16,6 +16,7 @@ pub use reader::{SceneFile, parse, parse_injected, read};
 use crate::arm::Arm;
 use crate::design::problem::{DesignProblem, Request};
 use crate::measurement::{Sensor, Weights};
+#[cfg(feature = "simulator")]
 use crate::simulation::cell::Cell;
 use crate::simulation::plan::Plan;
 
@@ -54,6 +55,7 @@ impl Scene {
     }
 
     /// The cell that measures.
+    #[cfg(feature = "simulator")]
     #[must_use]
     pub fn cell(&self) -> Cell<'_> {
         Cell { arm: &self.arm, sensor: &self.sensor, plan: &self.plan, seed: self.seed }

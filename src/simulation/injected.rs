@@ -19,6 +19,22 @@ pub struct Injected {
     pub noise: Noise,
 }
 
+impl Injected {
+    /// An arm whose parameters are the nominal ones, read with the declared noise, and these `effects`; whatever they leave open is
+    /// drawn from `seed`.
+    #[must_use]
+    pub fn of_effects(seed: &str, effects: Vec<Effect>) -> Self {
+        Injected {
+            seed: seed.to_owned(),
+            length_error_m: 0.0,
+            angle_error_rad: 0.0,
+            parameter_errors: Vec::new(),
+            effects,
+            noise: Noise::Declared { factor: 1.0 },
+        }
+    }
+}
+
 /// Noise that the readings really have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Noise {

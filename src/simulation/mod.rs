@@ -3,8 +3,10 @@
 //!
 //! Nothing that analyses measurements imports this: it sees what a real cell would give.
 
+#[cfg(feature = "simulator")]
 pub mod cell;
 pub mod effect;
 pub mod injected;
+#[cfg(feature = "simulator")]
 pub mod physics;
 pub mod plan;

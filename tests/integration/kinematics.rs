@@ -33,7 +33,7 @@ fn the_exported_arm_stands_where_kincal_says() {
         let path = format!("{}/scenes/{scene}.toml", env!("CARGO_MANIFEST_DIR"));
         kincal(out.path(), &["export", &path, "--to", "urdf"]).ends(0);
         let robot = urdf_rs::read_file(out.path().join(format!("{scene}.urdf"))).unwrap();
-        let arm = kincal::scene::read(path.as_ref()).unwrap().scene.arm;
+        let arm = kincal::scene::read(&path).unwrap().scene.arm;
         let tip = *arm.chain.frame_names().last().unwrap();
         let chain = arm.chain.at_nominal();
         let mut stream = stream(1, "test/integration/kinematics");
@@ -89,7 +89,7 @@ fn craig([a, d, alpha]: [f64; 3], theta: f64) -> Matrix4<f64> {
 #[test]
 fn the_panda_is_the_published_one() {
     let path = format!("{}/scenes/panda.toml", env!("CARGO_MANIFEST_DIR"));
-    let arm = kincal::scene::read(path.as_ref()).unwrap().scene.arm;
+    let arm = kincal::scene::read(&path).unwrap().scene.arm;
     let chain = arm.chain.at_nominal();
     let flange_from_nest = Matrix4::new_translation(&Vector3::new(0.05, 0.0, 0.107 + 0.02));
     // Stretched, ready as Franka's examples have it, and anywhere.
