@@ -1,10 +1,12 @@
 //! Conditions of each row, as far as they were recorded, and what follows from what is missing.
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
+use super::deflection::{Deflected, Loads, Present, deflected};
 use super::rows::Rows;
 use crate::effects::signature::library::Columns;
-use crate::effects::signature::shape::{FORGETTING_S, MEMORIES, Reading};
+use crate::effects::signature::shape::{Displacement, FORGETTING_S, MEMORIES, Reading};
 use crate::measurement::Measurement;
 
 /// A joint is upright where its torque never exceeds so many sigmas of what is not known of it: its axis leans by less than a degree, and
@@ -26,9 +28,15 @@ pub struct Conditions {
     pub times: Vec<f64>,
 }
 
-/// The conditions of `measurements`, whose geometry is `rows`.
+/// The conditions of `measurements`, whose geometry is `rows`, with the effects `present`, which answer to `loads`. Also what those do to
+/// the target of each row.
 #[must_use]
-pub fn conditions(measurements: &[&Measurement], rows: &Rows) -> Conditions {
+pub(crate) fn conditions(
+    measurements: &[&Measurement],
+    rows: &Rows,
+    present: &[Present],
+    loads: Loads,
+) -> (Conditions, Vec<Displacement>) {
     let mut notes = Vec::new();
     let count = rows.mechanism.joint_count();
     let total = measurements.len();
@@ -112,7 +120,45 @@ pub fn conditions(measurements: &[&Measurement], rows: &Rows) -> Conditions {
             memory: vec![[0.0; MEMORIES.len()]; count],
         });
     }
-    // What came before, in time.
+    // What remembers the loads of earlier readings, remembers those without effects.
+    remember(measurements, &in_time, &mut readings);
+    let deflected: Vec<Deflected> = readings
+        .par_iter()
+        .zip(measurements)
+        .map(|(reading, row)| deflected(rows, reading, row.payload_kg.unwrap_or(0.0), present, loads))
+        .collect();
+    let (mut readings, displacement): (Vec<Reading>, Vec<Displacement>) =
+        deflected.into_iter().map(|deflected| (deflected.reading, deflected.displacement)).unzip();
+    remember(measurements, &in_time, &mut readings);
+    let travel = (0..count)
+        .map(|joint| {
+            let values = measurements.iter().map(|row| row.joints[joint]);
+            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
+        })
+        .collect();
+    let unknown =
+        |reading: &Reading, joint: usize| reading.posture.torque(joint).abs() < UPRIGHT * reading.posture.moment_sigma(joint);
+    let upright = (0..count).map(|joint| readings.iter().all(|reading| unknown(reading, joint))).collect();
+    let margin = (total / 10).max(3);
+    let span = total.saturating_sub(2 * margin);
+    let stride = span.div_ceil(CHANGES).max(1);
+    let changes = (margin..total.saturating_sub(margin)).step_by(stride).collect();
+    let columns = Columns {
+        approach,
+        temperature,
+        orientation: rows.per_row == 6,
+        time,
+        rows: total,
+        travel,
+        upright,
+        changes: if time { changes } else { Vec::new() },
+    };
+    (Conditions { readings, columns, notes, times }, displacement)
+}
+
+/// What came before, in time: loads and moves that a joint may remember.
+fn remember(measurements: &[&Measurement], in_time: &[usize], readings: &mut [Reading]) {
+    let (count, total) = (readings.first().map_or(0, |reading| reading.joints.len()), readings.len());
     let mut memory = vec![[0.0; MEMORIES.len()]; count];
     for place in 0..total {
         let row = in_time[place];
@@ -140,30 +186,6 @@ pub fn conditions(measurements: &[&Measurement], rows: &Rows) -> Conditions {
             }
         }
     }
-    let travel = (0..count)
-        .map(|joint| {
-            let values = measurements.iter().map(|row| row.joints[joint]);
-            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
-        })
-        .collect();
-    let unknown =
-        |reading: &Reading, joint: usize| reading.posture.torque(joint).abs() < UPRIGHT * reading.posture.moment_sigma(joint);
-    let upright = (0..count).map(|joint| readings.iter().all(|reading| unknown(reading, joint))).collect();
-    let margin = (total / 10).max(3);
-    let span = total.saturating_sub(2 * margin);
-    let stride = span.div_ceil(CHANGES).max(1);
-    let changes = (margin..total.saturating_sub(margin)).step_by(stride).collect();
-    let columns = Columns {
-        approach,
-        temperature,
-        orientation: rows.per_row == 6,
-        time,
-        rows: total,
-        travel,
-        upright,
-        changes: if time { changes } else { Vec::new() },
-    };
-    Conditions { readings, columns, notes, times }
 }
 
 /// Mean of vectors; zero where there are none.

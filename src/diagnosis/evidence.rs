@@ -10,7 +10,7 @@ use crate::effects::signature::library::Hypothesis;
 use crate::effects::signature::shape::Shape;
 
 /// Prior standard deviations of a magnitude, in units of its usual one, and how likely each is.
-pub const SCALES: [(f64, f64); 3] = [(1.0, 0.45), (2.5, 0.45), (12.0, 0.10)];
+pub const SCALES: [(f64, f64); 4] = [(1.0, 0.44), (2.5, 0.44), (12.0, 0.10), (150.0, 0.02)];
 
 /// What is known of the noise beforehand: so many readings' worth (degrees of freedom) of a mean square, in declared sigmas.
 #[derive(Clone, Copy, Debug, PartialEq)]

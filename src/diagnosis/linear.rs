@@ -5,7 +5,7 @@ use nalgebra::{DVector, DVectorView};
 use super::evidence::Candidates;
 use super::products::{GeometryPrior, Products};
 use super::rows::Rows;
-use crate::effects::signature::shape::{Displacement, Reading};
+use crate::effects::signature::shape::Reading;
 
 /// A linear problem: rows, what may be in them, and what is measured minus what geometry alone predicts.
 #[derive(Clone, Debug)]
@@ -16,28 +16,22 @@ pub struct Linear<'a> {
     pub readings: &'a [Reading],
     /// What may be there.
     pub candidates: &'a Candidates,
-    /// Residual as it is with no effect taken out, m and rad.
+    /// Residual as it is with no effect taken out, to first order about those found so far, m and rad.
     pub residual: DVector<f64>,
     /// What is known of the geometry.
     pub prior: GeometryPrior,
 }
 
 impl<'a> Linear<'a> {
-    /// `displacement`: what the effects that were taken out before the fit of `rows` do to the target of each row; empty for nothing.
+    /// `residual`: as in [`Linear::residual`]. `scale`: of the geometry's prior.
     #[must_use]
     pub fn new(
         rows: &'a Rows,
         readings: &'a [Reading],
         candidates: &'a Candidates,
-        displacement: &[Displacement],
+        residual: DVector<f64>,
         scale: f64,
     ) -> Linear<'a> {
-        let mut residual = rows.residual.clone();
-        for (row, displacement) in displacement.iter().enumerate() {
-            for equation in 0..rows.per_row {
-                residual[row * rows.per_row + equation] += displacement[equation];
-            }
-        }
         let offset = DVector::from_fn(rows.jacobian.ncols(), |at, _| if rows.free[at] { 0.0 } else { rows.parameters[at] });
         let prior = GeometryPrior { offset, free: rows.free.clone(), scale };
         Linear { rows, readings, candidates, residual, prior }

@@ -10,6 +10,7 @@ mod candidates;
 mod claims;
 pub mod conditions;
 mod confusion;
+pub(crate) mod deflection;
 mod detectability;
 pub mod evidence;
 mod gap;
@@ -48,6 +49,7 @@ use crate::effects::{Kind, Location};
 use crate::measurement::{Measurement, Sensor};
 use candidates::{candidates, weigh};
 use conditions::Conditions;
+use deflection::{Loads, Present, present};
 use evidence::{Candidates, Evidence, Extension, NoisePrior};
 use groups::{Groups, Repeats};
 use held_out::{Block, HeldOut, Scheme, Validation};
@@ -62,9 +64,17 @@ use search::{Found, climb};
 /// Folds of the cross-validation.
 pub const FOLDS: usize = 5;
 /// Rounds of fitting around what was found.
-const PASSES: usize = 8;
+const PASSES: usize = 12;
 /// Effects of a set at most.
 const MOST: usize = 24;
+/// Effects of the first pass at most; twice as many in the next one, and so on.
+const FIRST: usize = 4;
+/// Passes in which the geometry's prior is chosen.
+const CHOOSING: usize = 3;
+/// Of the noise, the difference between loads as they are and as commanded that is worth trying both.
+const LOADS_MATTER: f64 = 0.3;
+/// Of the noise, the movement of a target from pass to pass that is nothing.
+const SETTLED_SHARE: f64 = 0.1;
 /// Sigmas of the geometry's prior over those of manufacturing that are tried: the data say how far the arm is from nominal.
 const GEOMETRY_SCALES: [f64; 5] = [3.0, 1.0, 0.3, 0.1, 0.03];
 /// Times that what was found is looked through for joints that do not repeat.
@@ -140,6 +150,10 @@ struct State {
     dependent: Vec<f64>,
     /// What the effects found so far do.
     displacement: Vec<Displacement>,
+    /// Their coefficients: column and value.
+    coefficients: Vec<(usize, f64)>,
+    /// The same with the hypotheses.
+    present: Vec<Present>,
     /// The best set so far.
     members: Vec<(usize, usize)>,
     /// Ripples that scans have added to the library.
@@ -150,6 +164,8 @@ struct State {
     orientation: f64,
     /// Sigma of the geometry's prior over that of manufacturing.
     scale: f64,
+    /// Where loads act.
+    loads: Loads,
 }
 
 impl State {
@@ -160,11 +176,14 @@ impl State {
             far: vec![1.0; rows],
             dependent: vec![1.0; rows],
             displacement: Vec::new(),
+            coefficients: Vec::new(),
+            present: Vec::new(),
             members: Vec::new(),
             ripples: Vec::new(),
             scatter: Vec::new(),
             orientation: data.orientation.unwrap_or(1.0),
             scale: 1.0,
+            loads: Loads::AsItStands,
         }
     }
 
@@ -178,14 +197,17 @@ impl State {
             far: pass.weighed.far.clone(),
             dependent: pass.weighed.dependent.clone(),
             displacement: pass.displacement.clone(),
+            coefficients: pass.coefficients.clone(),
+            present: pass.present.clone(),
             members: pass.members.clone(),
             scale: pass.scale,
+            loads: pass.loads,
             ..self.clone()
         }
     }
 
-    /// Whether `pass` found what it was made around.
-    fn is_settled(&self, pass: &Pass) -> bool {
+    /// Whether `pass` found what it was made around. `sigma_m`: noise of a position about an axis.
+    fn is_settled(&self, pass: &Pass, sigma_m: f64) -> bool {
         let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-2);
         let sorted = |members: &[(usize, usize)]| {
             let mut sorted = members.to_vec();
@@ -196,6 +218,9 @@ impl State {
             && same(&pass.weighed.dependent, &self.dependent)
             && sorted(&pass.members) == sorted(&self.members)
             && pass.scale == self.scale
+            && pass.complete
+            && pass.loads == self.loads
+            && pass.changed_m < SETTLED_SHARE * sigma_m
     }
 }
 
@@ -211,8 +236,24 @@ struct Pass {
     scale: f64,
     /// The likeliest set.
     members: Vec<(usize, usize)>,
-    /// What it does to each row.
+    /// Its coefficients: column and value.
+    coefficients: Vec<(usize, f64)>,
+    /// The same with the hypotheses.
+    present: Vec<Present>,
+    /// What it does to each row, as large as it is.
     displacement: Vec<Displacement>,
+    /// By how much that moves a target more or less than what the pass was made around, at most, m.
+    changed_m: f64,
+    /// Whether nothing more was to be found.
+    complete: bool,
+    /// Where loads act.
+    loads: Loads,
+    /// By how much a target would be elsewhere if they acted otherwise, at most, m.
+    loads_matter_m: f64,
+    /// Of the readings with the likeliest set.
+    log_likelihood: f64,
+    /// Residual with no effect taken out ([`Linear::residual`]).
+    total: DVector<f64>,
     /// What it leaves, m and rad.
     residual: DVector<f64>,
     weighed: weights::Weighed,
@@ -220,26 +261,40 @@ struct Pass {
 
 impl Pass {
     /// `pass`: number of the pass; the geometry's prior is chosen in the first ones.
-    fn new(data: &Data<'_>, state: &State, pass: usize) -> Result<Pass, DiagnosisError> {
+    /// `number`: of the pass. The geometry's prior is chosen in the first ones, and few effects are looked for, so that the largest
+    /// ones are taken as large as they are before anything is looked for beside them.
+    fn new(data: &Data<'_>, state: &State, number: usize) -> Result<Pass, DiagnosisError> {
         let weights = state.weights();
-        let (measurements, displacement) = (data.measurements, &state.displacement);
+        let measurements = data.measurements;
         let orientation_sigma_rad = data.sensor.orientation_sigma_rad.map(|sigma| sigma * state.orientation);
         let sensor = &Sensor { orientation_sigma_rad, ..data.sensor.clone() };
-        let readings = Readings { sensor, measurements, weights: &weights, displacement, scatter: &state.scatter };
+        let readings =
+            Readings { sensor, measurements, weights: &weights, displacement: &state.displacement, scatter: &state.scatter };
         let rows = rows::fit(data.arm, readings)?;
-        let conditions = conditions::conditions(measurements, &rows);
+        let (conditions, displaced) = conditions::conditions(measurements, &rows, &state.present, state.loads);
         let mut candidates = candidates(data.options.hypotheses(&rows, &conditions, &state.ripples));
         let scheme = held_out::schemes(measurements, &rows.targets, &data.groups).swap_remove(0);
-        let linear = Linear::new(&rows, &conditions.readings, &candidates, displacement, state.scale);
+        // The effects found so far are taken out as large as they are on the arm as it is fitted now, and put back along their signatures.
+        let mut total = rows.residual.clone();
+        for (row, now) in displaced.iter().enumerate() {
+            let before = state.displacement.get(row).copied().unwrap_or_default();
+            for equation in 0..rows.per_row {
+                total[row * rows.per_row + equation] += before[equation] - now[equation];
+            }
+        }
+        let linear = Linear::new(&rows, &conditions.readings, &candidates, total, state.scale);
+        let total = &linear.residual + linear.made(&state.coefficients);
+        let linear = Linear { residual: total, ..linear };
         let products = linear.products(&scheme.fold, scheme.folds);
-        let prior = linear.prior;
+        let Linear { residual: total, prior, .. } = linear;
         let marginal = Marginal::new(&products, None, &prior).ok_or(DiagnosisError::Degenerate)?;
         let information: Vec<f64> = (0..candidates.hypotheses.len()).map(|number| marginal.information(number)).collect();
         weigh(&mut candidates, &information);
         let evidence = Evidence { marginal: &marginal, candidates: &candidates, noise: data.noise };
-        let (mut members, _) = climb(&evidence, &state.members, MOST);
+        let most = MOST.min(FIRST << number.min(8));
+        let (mut members, _) = climb(&evidence, &state.members, most);
         let mut scale = state.scale;
-        if pass < 3 {
+        if number < CHOOSING {
             let likelihood = |scale: f64| -> f64 {
                 let other = Marginal::new(&products, None, &prior.scaled(scale));
                 other.map_or(f64::NEG_INFINITY, |other| Evidence { marginal: &other, ..evidence }.log_likelihood(&members))
@@ -256,21 +311,47 @@ impl Pass {
         };
         let evidence = Evidence { marginal, candidates: &candidates, noise: data.noise };
         if scale != state.scale {
-            members = climb(&evidence, &members, MOST).0;
+            members = climb(&evidence, &members, most).0;
         }
-        let linear = Linear::new(&rows, &conditions.readings, &candidates, displacement, scale);
         let coefficients = evidence.coefficients(&members);
-        let made = linear.made(&coefficients);
-        let residual = linear.left(&marginal.geometry(&coefficients), &made);
+        let geometry = marginal.geometry(&coefficients);
+        let linear = Linear::new(&rows, &conditions.readings, &candidates, total, scale);
+        let residual = linear.left(&geometry, &linear.made(&coefficients));
         let weighed = weights::weigh(&rows, &residual, &weights, &data.groups);
-        let per_row = rows.per_row;
-        let displacement =
-            made.as_slice().chunks(per_row).map(|row| std::array::from_fn(|at| row.get(at).copied().unwrap_or(0.0))).collect();
-        Ok(Pass { rows, conditions, candidates, scheme, products, scale, members, displacement, residual, weighed })
+        let total = linear.residual;
+        let present = present(&candidates, &coefficients);
+        let made = |loads: Loads| conditions::conditions(measurements, &rows, &present, loads).1;
+        let displacement = made(state.loads);
+        let apart = |one: &[Displacement], other: &[Displacement]| {
+            let change = |(a, b): (&Displacement, &Displacement)| libm::hypot(libm::hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
+            one.iter().zip(other).map(change).fold(0.0, f64::max)
+        };
+        let changed_m = apart(&displacement, &displaced);
+        let loads_matter_m = apart(&displacement, &made(state.loads.other()));
+        Ok(Pass {
+            complete: members.len() < most || most == MOST,
+            log_likelihood: evidence.log_likelihood(&members),
+            loads: state.loads,
+            loads_matter_m,
+            rows,
+            conditions,
+            candidates,
+            scheme,
+            products,
+            scale,
+            members,
+            coefficients,
+            present,
+            displacement,
+            changed_m,
+            total,
+            residual,
+            weighed,
+        })
     }
 
-    fn linear(&self, state: &State) -> Linear<'_> {
-        Linear::new(&self.rows, &self.conditions.readings, &self.candidates, &state.displacement, self.scale)
+    fn linear(&self) -> Linear<'_> {
+        Linear::new(&self.rows, &self.conditions.readings, &self.candidates, self.total.clone(), self.scale)
     }
 }
 
@@ -318,7 +399,7 @@ pub fn diagnose(
 ) -> Result<Diagnosis, DiagnosisError> {
     let data = Data::new(arm, sensor, measurements, options);
     let (state, pass) = settle(&data)?;
-    let linear = pass.linear(&state);
+    let linear = pass.linear();
     let marginal = Marginal::new(&pass.products, None, &linear.prior).ok_or(DiagnosisError::Degenerate)?;
     let evidence = Evidence { marginal: &marginal, candidates: &pass.candidates, noise: data.noise };
     let found = search::search(&evidence, &pass.members, MOST);
@@ -368,12 +449,20 @@ pub fn diagnose(
 /// their own. The last pass, and what it was made around.
 fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
     let mut state = State::nominal(data);
+    let sigma_m = data.sensor.mean_position_sigma(data.measurements.iter().copied());
     let (mut last, mut looks) = (PASSES - 1, 0);
     // Without any scatter: held-out errors, and the state to go back to.
     let mut plain: Option<(f64, State)> = None;
     for number in 0.. {
-        let pass = Pass::new(data, &state, number)?;
-        let linear = pass.linear(&state);
+        let mut pass = Pass::new(data, &state, number)?;
+        if number < CHOOSING + 2 && pass.loads_matter_m > LOADS_MATTER * sigma_m {
+            let other = State { loads: state.loads.other(), ..state.clone() };
+            let otherwise = Pass::new(data, &other, number)?;
+            if otherwise.log_likelihood > pass.log_likelihood {
+                (state, pass) = (other, otherwise);
+            }
+        }
+        let linear = pass.linear();
         let marginal = Marginal::new(&pass.products, None, &linear.prior).ok_or(DiagnosisError::Degenerate)?;
         let evidence = Evidence { marginal: &marginal, candidates: &pass.candidates, noise: data.noise };
         if number < last {
@@ -381,7 +470,7 @@ fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
             let known = state.orientation != 1.0;
             let ratio = weights::orientation_over_position(&pass.rows, &pass.residual, known).filter(|_| may_tell);
             let more = ripple::scan(&linear, &pass.residual, evidence.noise_level(&pass.members));
-            if !state.is_settled(&pass) || !more.is_empty() || ratio.is_some() {
+            if !state.is_settled(&pass, sigma_m) || !more.is_empty() || ratio.is_some() {
                 state = state.after(&pass);
                 state.ripples.extend(more);
                 state.orientation *= ratio.unwrap_or(1.0);
@@ -452,7 +541,6 @@ fn outliers_of(data: &Data<'_>, pass: &Pass, found: &Found) -> outliers::Outlier
 /// A data set around its calibrated geometry, ready for the evidence of single effects.
 pub struct Singles {
     pass: Pass,
-    state: State,
     noise: NoisePrior,
 }
 
@@ -464,13 +552,13 @@ impl Singles {
     pub fn new(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], options: &Options) -> Result<Singles, DiagnosisError> {
         let data = Data::new(arm, sensor, measurements, options);
         let state = State::nominal(&data);
-        Ok(Singles { pass: Pass::new(&data, &state, PASSES)?, state, noise: data.noise })
+        Ok(Singles { pass: Pass::new(&data, &state, PASSES)?, noise: data.noise })
     }
 
     /// The evidence of every hypothesis alone, at every scale of its prior: geometry taken out, marginal likelihoods.
     #[must_use]
     pub fn evidence(&self) -> Vec<Extension> {
-        let linear = self.pass.linear(&self.state);
+        let linear = self.pass.linear();
         let Some(marginal) = Marginal::new(&self.pass.products, None, &linear.prior) else {
             return Vec::new();
         };

@@ -388,7 +388,7 @@ fn what_survives_of_the_geometry_is_that_of_the_whole_system() {
     let data = super::Data::new(&arm, &sensor, &rows, &options);
     let state = super::State { scale: 0.3, ..super::State::nominal(&data) };
     let pass = super::Pass::new(&data, &state, super::PASSES).unwrap();
-    let linear = pass.linear(&state);
+    let linear = pass.linear();
     let out = 1;
     let marginal = super::Marginal::new(&pass.products, Some(out), &linear.prior).unwrap();
     let kept: Vec<usize> = (0..rows.len()).filter(|row| pass.scheme.fold[*row] != out).collect();

@@ -2,6 +2,7 @@
 //! ([`Waterfall::displacements`]), or told by somebody else, such as a simulation.
 
 use super::conditions::{self, Conditions};
+use super::deflection::Loads;
 use super::groups::groups;
 use super::held_out::{self, Scheme};
 use super::outcome::Effect;
@@ -47,7 +48,7 @@ impl<'a> Waterfall<'a> {
         let groups = groups(measurements);
         let start = vec![1.0; total];
         let rows = rows::fit(arm, Readings { sensor, measurements, weights: &start, displacement: &[], scatter: &[] })?;
-        let conditions = conditions::conditions(measurements, &rows);
+        let (conditions, _) = conditions::conditions(measurements, &rows, &[], Loads::AsItStands);
         let scheme = held_out::schemes(measurements, &rows.targets, &groups).swap_remove(0);
         let good = vec![true; total];
         let mut waterfall = Waterfall { arm, sensor, measurements, rows, conditions, scheme, weights: start, good };
@@ -59,7 +60,7 @@ impl<'a> Waterfall<'a> {
             let outliers = outliers::look(&weighed.squares, rows.per_row).rows;
             waterfall.good = (0..total).map(|row| !outliers.contains(&row)).collect();
             waterfall.weights = weighed.far.iter().zip(&weighed.dependent).map(|(a, b)| a * b).collect();
-            waterfall.conditions = conditions::conditions(measurements, &rows);
+            waterfall.conditions = conditions::conditions(measurements, &rows, &[], Loads::AsItStands).0;
             waterfall.rows = rows;
         }
         Ok(waterfall)

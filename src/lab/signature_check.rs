@@ -6,6 +6,7 @@ use super::challenge::{Options, case};
 use super::detectability::{difference, has_signal, noiseless};
 use super::injection::places;
 use crate::diagnosis::conditions::conditions;
+use crate::diagnosis::deflection::Loads;
 use crate::diagnosis::rows::{Readings, fit};
 use crate::effects::Kind;
 use crate::effects::signature::library::library;
@@ -51,7 +52,7 @@ fn every_signature_is_what_physics_makes() {
         Readings { sensor: &scene.sensor, measurements: &rows, weights: &vec![1.0; rows.len()], displacement: &[], scatter: &[] },
     )
     .unwrap();
-    let known = conditions(&rows, &fitted);
+    let known = conditions(&rows, &fitted, &[], Loads::AsItStands).0;
     let library = library(&Mechanism::new(&scene.arm), &known.columns);
     for kind in Kind::known() {
         for place in places(kind, &scene.arm) {

@@ -90,11 +90,21 @@ impl Mechanism {
     /// The arm at the coordinates `joints` (rad or m), with a payload (kg) at the origin of its tool frame.
     #[must_use]
     pub fn posture(&self, joints: &[f64], payload_kg: f64) -> Posture {
+        self.posture_moved(joints, payload_kg, &[])
+    }
+
+    /// The same where rigid motions (in root) move what is outboard: `motions[0]` the whole arm, `motions[i]` what moves with joint `i`
+    /// (from 1) and beyond. None that is missing moves anything.
+    #[must_use]
+    pub fn posture_moved(&self, joints: &[f64], payload_kg: f64, motions: &[Motion]) -> Posture {
         let count = self.joint_count();
         let (mut axes, mut frames, mut origins) = (Vec::new(), Vec::new(), Vec::new());
         let mut centres = Vec::with_capacity(count);
         let mut rotation = Matrix3::identity();
         let mut origin = Vector3::zeros();
+        if let Some(motion) = motions.first() {
+            (rotation, origin) = (motion.rotation, motion.translation);
+        }
         for (joint, segment) in self.segments.iter().enumerate() {
             origin += rotation * segment.translation.vector;
             rotation *= segment.rotation.to_rotation_matrix().into_inner();
@@ -110,6 +120,10 @@ impl Mechanism {
                 let (sine, cosine) = libm::sincos(joints[joint]);
                 let (x, y): (Vector3<f64>, Vector3<f64>) = (rotation.column(0).into(), rotation.column(1).into());
                 rotation = Matrix3::from_columns(&[x * cosine + y * sine, y * cosine - x * sine, axis]);
+            }
+            if let Some(motion) = motions.get(joint + 1) {
+                origin = motion.of_point(&origin);
+                rotation = motion.rotation * rotation;
             }
             frames.push(rotation);
             let (mass, centre) = &self.centres[joint];
@@ -130,6 +144,62 @@ impl Mechanism {
             .map(|joint| self.segments[joint + 1..].iter().map(|segment| segment.translation.vector.norm()).sum())
             .collect();
         Posture { axes, frames, origins, tool: origin, tool_axes: rotation, forces, moments, reaches }
+    }
+}
+
+/// A rigid motion in root: `point → rotation · point + translation`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// Turn.
+    pub rotation: Matrix3<f64>,
+    /// Shift, m.
+    pub translation: Vector3<f64>,
+}
+
+impl Motion {
+    /// No motion.
+    pub const IDENTITY: Motion =
+        Motion { rotation: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), translation: Vector3::new(0.0, 0.0, 0.0) };
+
+    /// `first`, then this.
+    #[must_use]
+    pub fn after(&self, first: &Motion) -> Motion {
+        Motion { rotation: self.rotation * first.rotation, translation: self.of_point(&first.translation) }
+    }
+
+    /// The motion back.
+    #[must_use]
+    pub fn inverse(&self) -> Motion {
+        let rotation = self.rotation.transpose();
+        Motion { rotation, translation: -(rotation * self.translation) }
+    }
+
+    /// The motion that moves on from `twist` (shift of `point` in m, turn in rad): a screw about the axis that stays.
+    #[must_use]
+    pub fn of_twist(twist: &[f64; 6], point: &Vector3<f64>) -> Motion {
+        let turn = Vector3::new(twist[3], twist[4], twist[5]);
+        let shift = Vector3::new(twist[0], twist[1], twist[2]) - turn.cross(point);
+        let square = turn.norm_squared();
+        let angle = libm::sqrt(square);
+        // Series where the angle is small: 1 − θ²/6, 1/2 − θ²/24, 1/6 − θ²/120.
+        let (a, b, c) = if angle < 1e-4 {
+            (1.0 - square / 6.0, 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0)
+        } else {
+            let (sine, cosine) = libm::sincos(angle);
+            (sine / angle, (1.0 - cosine) / square, (angle - sine) / (square * angle))
+        };
+        let cross = turn.cross_matrix();
+        let cross2 = cross * cross;
+        Motion {
+            rotation: Matrix3::identity() + cross * a + cross2 * b,
+            translation: (Matrix3::identity() + cross * b + cross2 * c) * shift,
+        }
+    }
+
+    /// Where `point` comes to.
+    #[must_use]
+    pub fn of_point(&self, point: &Vector3<f64>) -> Vector3<f64> {
+        self.rotation * point + self.translation
     }
 }
 
