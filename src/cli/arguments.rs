@@ -166,6 +166,12 @@ pub(crate) struct NewOptions {
     /// Number of effects of a case: a number, or fewest..most (both included)
     #[arg(long, value_name = "N|A..B", default_value = "0..3", allow_hyphen_values = true)]
     pub(crate) effects: String,
+    /// Effects outside the analyser's library in every case, beside those of --kinds
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) outside: usize,
+    /// Magnitudes up to those of hobby and cable-driven arms: joints that yield by degrees, play of two degrees
+    #[arg(long)]
+    pub(crate) soft: bool,
     /// Share of cases without an effect; without it every number of effects is as likely
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     pub(crate) base_rate: Option<f64>,

@@ -91,8 +91,11 @@ fn new(global: &Global, options: &NewOptions) -> anyhow::Result<Outcome> {
         poses: options.poses,
         repeats: options.repeats.unwrap_or(options.poses / 6),
         withheld: withheld(&options.withheld)?,
+        outside: options.outside,
+        soft: options.soft,
     };
     ensure!((1..=9999).contains(&cases.cases), "--cases {}: 1 to 9999", cases.cases);
+    ensure!(cases.outside <= MOST_OUTSIDE, "--outside {}: {MOST_OUTSIDE} at most", cases.outside);
     ensure!(
         cases.heavy_tails + cases.understated <= 1.0,
         "--heavy-tails and --understated are shares of all cases: together 1 at most"
@@ -178,16 +181,23 @@ fn withheld(given: &[String]) -> anyhow::Result<Vec<String>> {
     Ok(given.to_vec())
 }
 
+/// Effects of a case at most.
+const MOST_EFFECTS: usize = 24;
+/// Of those outside the library.
+const MOST_OUTSIDE: usize = 4;
+
 /// `2` or `0..3`, both ends included.
 fn effects(text: &str) -> anyhow::Result<[usize; 2]> {
-    let number = |text: &str| text.trim().trim_start_matches('=').parse::<usize>().ok().filter(|number| *number <= 8);
+    let number = |text: &str| text.trim().trim_start_matches('=').parse::<usize>().ok().filter(|number| *number <= MOST_EFFECTS);
     let range = match text.split_once("..") {
         Some((from, to)) => number(from).zip(number(to)),
         None => number(text).map(|number| (number, number)),
     };
     match range {
         Some((from, to)) if from <= to => Ok([from, to]),
-        _ => bail!("--effects {text}: a number of effects such as 1, or fewest and most such as 0..3 (both included, 8 at most)"),
+        _ => bail!(
+            "--effects {text}: a number of effects such as 1, or fewest and most such as 0..3 (both included, {MOST_EFFECTS} at most)"
+        ),
     }
 }
 

@@ -57,7 +57,6 @@ pub(crate) fn named(signature: &Signature, after: impl Fn(usize) -> f64) -> Para
         | Shape::UnequalBend { .. }
         | Shape::UnequalSeat { .. }
         | Shape::UnequalShift { .. }
-        | Shape::RootAcross { .. }
         | Shape::BaseCourse { .. }
         | Shape::ToolCourse { .. }
         | Shape::Bump { .. }

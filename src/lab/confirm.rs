@@ -366,7 +366,6 @@ fn simulated_as(effect: &outcome::Effect, masses_known: bool) -> Result<Vec<Effe
         Shape::UnequalBend { .. }
         | Shape::UnequalSeat { .. }
         | Shape::UnequalShift { .. }
-        | Shape::RootAcross { .. }
         | Shape::BaseCourse { .. }
         | Shape::ToolCourse { .. }
         | Shape::Bump { .. }

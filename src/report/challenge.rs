@@ -98,6 +98,31 @@ pub fn score(score: &Score, who: &str, seconds: &[f64]) -> String {
     });
     text.push_str(&table(&["kind not to be known", "cases", "flagged unknown", "misnamed"], foreign.collect()));
     text.push('\n');
+    let mixed = &score.mixed;
+    if mixed.cases > 0 {
+        text.push_str(&table(
+            &["known beside unknown kinds", "cases", "known, λ ≥ 60, named", "right among named", "unknown, λ ≥ 60, flagged"],
+            vec![vec![
+                "all".to_owned(),
+                mixed.cases.to_string(),
+                share(mixed.visible_found, mixed.visible_effects),
+                share(mixed.named_right, mixed.named),
+                share(mixed.flagged, mixed.visible_outside),
+            ]],
+        ));
+        text.push('\n');
+    }
+    let competition = &score.competition;
+    text.push_str(&table(
+        &["as in competitions", "false alarms", "detected, λ ≥ 40", "mean probability of the true cause, λ ≥ 40"],
+        vec![vec![
+            "all".to_owned(),
+            share(competition.false_alarms, competition.quiet_cases),
+            share(competition.detected, competition.faulty_cases),
+            competition.mean_probability_of_true.map_or_else(|| "–".to_owned(), |mean| format!("{mean:.3}")),
+        ]],
+    ));
+    text.push('\n');
     if let Some(rows) = &score.restored {
         text.push_str(&restored(rows));
         text.push('\n');

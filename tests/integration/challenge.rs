@@ -34,6 +34,8 @@ fn options() -> Options {
         poses: 24,
         repeats: 4,
         withheld: Vec::new(),
+        outside: 0,
+        soft: false,
     }
 }
 

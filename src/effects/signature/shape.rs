@@ -9,8 +9,8 @@ pub use super::unnamed::angle_map::MAP_ORDERS;
 pub use super::unnamed::memory::MEMORIES;
 pub use super::unnamed::torque_memory::FORGETTING_S;
 use super::unnamed::{
-    all_yield, angle_curve, angle_map, bump, course, crosstalk, direction_load, memory, nonlinear_torque, root_across,
-    time_curve, torque_memory, unequal_bend, unequal_seat, unequal_shift,
+    all_yield, angle_curve, angle_map, bump, course, crosstalk, direction_load, memory, nonlinear_torque, time_curve,
+    torque_memory, unequal_bend, unequal_seat, unequal_shift,
 };
 use super::{
     backlash, base_drift, base_step, gear_coupling, gravity_lost_motion, joint_compliance, joint_eccentricity,
@@ -152,12 +152,6 @@ pub enum Shape {
     },
     /// \[2\] A shift: the force across a joint seats it, along the x and y axes of its link unequally.
     UnequalShift {
-        /// Joint, or the link that it moves.
-        #[serde(with = "from_one")]
-        joint: usize,
-    },
-    /// \[1\] A turn about a joint's origin along the moment across its axis, with the root of its size.
-    RootAcross {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
         joint: usize,
@@ -313,8 +307,6 @@ pub enum Family {
     UnequalSeat,
     /// A bearing that shifts unequally.
     UnequalShift,
-    /// A link that bends, not in proportion.
-    RootAcross,
     /// The base over time.
     BaseCourse,
     /// The tool over time.
@@ -453,7 +445,6 @@ impl Shape {
             Shape::UnequalBend { joint } => unequal_bend::columns(reading, joint),
             Shape::UnequalSeat { joint } => unequal_seat::columns(reading, joint),
             Shape::UnequalShift { joint } => unequal_shift::columns(reading, joint),
-            Shape::RootAcross { joint } => root_across::columns(reading, joint),
             Shape::BaseCourse { course } => course::base_columns(reading, course),
             Shape::ToolCourse { course } => course::tool_columns(reading, course, orientation),
             Shape::Bump { joint, centre, half_width } => bump::columns(reading, joint, centre, half_width),
@@ -486,7 +477,6 @@ impl Shape {
             | Shape::ForceAcrossSign { .. }
             | Shape::MomentAcrossSign { .. }
             | Shape::Scale
-            | Shape::RootAcross { .. }
             | Shape::Bump { .. }
             | Shape::TorqueMemory { .. }
             | Shape::DirectionLoad { .. }
@@ -551,7 +541,6 @@ impl Shape {
             | Shape::UnequalBend { .. }
             | Shape::UnequalSeat { .. }
             | Shape::UnequalShift { .. }
-            | Shape::RootAcross { .. }
             | Shape::BaseCourse { .. }
             | Shape::ToolCourse { .. }
             | Shape::Bump { .. }
@@ -591,7 +580,6 @@ impl Shape {
             | Shape::UnequalBend { .. }
             | Shape::UnequalSeat { .. }
             | Shape::UnequalShift { .. }
-            | Shape::RootAcross { .. }
             | Shape::BaseCourse { .. }
             | Shape::ToolCourse { .. }
             | Shape::Bump { .. }
@@ -618,7 +606,6 @@ impl Shape {
             Shape::UnequalSeat { .. } => (Family::UnequalSeat, Some(Kind::TiltClearance)),
             Shape::UnequalShift { .. } => (Family::UnequalShift, Some(Kind::RadialClearance)),
             Shape::Softening { .. } | Shape::Hardening { .. } => (Family::NonlinearTorque, Some(Kind::JointCompliance)),
-            Shape::RootAcross { .. } => (Family::RootAcross, None),
             Shape::BaseCourse { .. } => (Family::BaseCourse, None),
             Shape::ToolCourse { .. } => (Family::ToolCourse, None),
             Shape::Bump { .. } => (Family::Bump, None),

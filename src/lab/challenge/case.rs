@@ -58,6 +58,46 @@ pub struct Options {
     pub repeats: usize,
     /// Kinds that whoever diagnoses is not to use: they count as unknown ones.
     pub withheld: Vec<String>,
+    /// Effects outside the analyser's library beside those drawn from `kinds`.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub outside: usize,
+    /// Magnitudes up to those of hobby and cable-driven arms ([`softest`]).
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub soft: bool,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for it so")]
+fn is_zero(number: &usize) -> bool {
+    *number == 0
+}
+
+/// How many times the upper end of its realistic range a kind reaches on hobby and cable-driven arms: joints that yield by a degree under
+/// their load, gears with one to two degrees of play, encoders and gears ten times worse (assumed).
+#[must_use]
+pub fn softest(kind: Kind) -> f64 {
+    match kind {
+        Kind::Backlash | Kind::GravityLostMotion => 60.0,
+        Kind::JointCompliance
+        | Kind::LinkBending
+        | Kind::HardeningStiffness
+        | Kind::JointEccentricity
+        | Kind::StrainWaveError
+        | Kind::GearCoupling
+        | Kind::RadialClearance
+        | Kind::TiltClearance => 10.0,
+        Kind::LinkThermalGrowth
+        | Kind::JointThermalDrift
+        | Kind::BaseDrift
+        | Kind::BaseStep
+        | Kind::ToolStep
+        | Kind::MeasurementScale
+        | Kind::MeasurementOutliers
+        | Kind::WornToothSector
+        | Kind::CreepAfterMotion
+        | Kind::MomentCrosstalk
+        | Kind::MemoryHysteresis
+        | Kind::WrongPayload => 1.0,
+    }
 }
 
 impl Options {
@@ -75,6 +115,8 @@ impl Options {
             poses,
             repeats,
             withheld: Vec::new(),
+            outside: 0,
+            soft: false,
         }
     }
 }
@@ -241,11 +283,15 @@ pub fn hidden(public: &Public, options: &Options, key: &[u8; 32], index: usize) 
     let arm = &public.file.scene.arm;
     let choice: Vec<Kind> = options.kinds.iter().filter_map(|name| Kind::from_name(name)).collect();
     let (mut kinds, mut effects): (Vec<Kind>, Vec<Effect>) = (Vec::new(), Vec::new());
-    while effects.len() < count {
+    let foreign: Vec<Kind> = Kind::foreign().collect();
+    while effects.len() < count + options.outside {
+        // Those outside the library come last.
+        let choice = if effects.len() < count { &choice } else { &foreign };
         let kind = choice[stream.index(choice.len())];
         let places = places(kind, arm);
         let place = places[stream.index(places.len())];
         let [low, high] = kind.range(place, arm.joint_count());
+        let high = if options.soft { high * softest(kind) } else { high };
         let magnitude = low * libm::pow(high / low, stream.unit());
         let effect = Effect::drawn(kind, place, magnitude, arm, &mut stream);
         // The same twice would be one of another size; there may be too few others.

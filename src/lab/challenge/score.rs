@@ -49,6 +49,10 @@ pub struct Score {
     pub by_kind: Vec<ByKind>,
     /// Cases with two or more effects, all known.
     pub several: Several,
+    /// Cases with effects of known kinds beside some that are not to be known.
+    pub mixed: Mixed,
+    /// As competitions of diagnosis programs count: false alarms, detection, the probability of what is true.
+    pub competition: Competition,
     /// Cases without an effect, by their noise.
     pub effect_free: Vec<EffectFree>,
     /// Cases with an effect that is not to be known: λ below 60, 60 and more, none.
@@ -124,6 +128,40 @@ pub struct Several {
     pub named: usize,
     /// Of these, right with their places.
     pub named_right: usize,
+}
+
+/// Cases with effects of known kinds beside some that are not to be known.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Mixed {
+    /// Cases.
+    pub cases: usize,
+    /// Effects of known kinds with λ ≥ 60.
+    pub visible_effects: usize,
+    /// Of these, named at their places.
+    pub visible_found: usize,
+    /// Effects named.
+    pub named: usize,
+    /// Of these, right with their places.
+    pub named_right: usize,
+    /// Cases in which one that is not to be known has λ ≥ 60.
+    pub visible_outside: usize,
+    /// Of these, called unknown.
+    pub flagged: usize,
+}
+
+/// In the form of diagnosis competitions.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Competition {
+    /// Cases without an effect, outliers of heavy tails aside.
+    pub quiet_cases: usize,
+    /// Of these, those in which anything is named or called unknown.
+    pub false_alarms: usize,
+    /// Cases with an effect with λ ≥ 40.
+    pub faulty_cases: usize,
+    /// Of these, those in which anything is named or called unknown.
+    pub detected: usize,
+    /// Mean probability that is given to the true kind at its place (named or in a set), of effects of known kinds with λ ≥ 40.
+    pub mean_probability_of_true: Option<f64>,
 }
 
 /// Cases without an effect.
@@ -320,7 +358,14 @@ pub fn score(truths: &[CaseTruth], verdicts: &[Verdict], withheld: &[String]) ->
     for (truth, verdict) in pairs().filter(|(truth, _)| truth.effects.len() > 1 && !truth.effects.iter().any(foreign)) {
         several.take(truth, verdict);
     }
+    let mut mixed = Mixed::default();
+    let is_mixed = |truth: &CaseTruth| truth.effects.iter().any(foreign) && !truth.effects.iter().all(foreign);
+    for (truth, verdict) in pairs().filter(|(truth, _)| is_mixed(truth)) {
+        mixed.take(truth, verdict, &foreign);
+    }
     Score {
+        mixed,
+        competition: competition(truths, verdicts, &foreign),
         cases: truths.len().min(verdicts.len()),
         single: bins,
         by_kind,
@@ -375,6 +420,50 @@ impl Several {
         self.named += named.len();
         self.named_right += right;
     }
+}
+
+impl Mixed {
+    fn take(&mut self, truth: &CaseTruth, verdict: &Verdict, foreign: &dyn Fn(&TrueEffect) -> bool) {
+        let named = named(verdict);
+        let visible = |effect: &&TrueEffect| effect.lambda.is_some_and(|lambda| lambda >= FLAGGED_FROM);
+        let known = || truth.effects.iter().filter(|effect| !foreign(effect));
+        self.cases += 1;
+        self.visible_effects += known().filter(visible).count();
+        self.visible_found += known().filter(visible).filter(|effect| named.iter().any(|claim| is(claim, effect))).count();
+        self.named += named.len();
+        self.named_right += named.iter().filter(|claim| known().any(|effect| is(claim, effect))).count();
+        if truth.effects.iter().filter(|effect| foreign(effect)).any(|effect| visible(&effect)) {
+            self.visible_outside += 1;
+            self.flagged += usize::from(flagged(verdict));
+        }
+    }
+}
+
+fn competition(truths: &[CaseTruth], verdicts: &[Verdict], foreign: &dyn Fn(&TrueEffect) -> bool) -> Competition {
+    let mut found = Competition::default();
+    let mut probabilities = Vec::new();
+    for (truth, verdict) in truths.iter().zip(verdicts) {
+        let tails = truth.noise.tails.is_some();
+        let alarm = flagged(verdict) || named(verdict).iter().any(|claim| !(tails && claim.kind == "measurement_outliers"));
+        if truth.effects.is_empty() {
+            found.quiet_cases += 1;
+            found.false_alarms += usize::from(alarm);
+        }
+        if truth.effects.iter().any(|effect| bin(effect.lambda) == 3) {
+            found.faulty_cases += 1;
+            found.detected += usize::from(alarm);
+        }
+        for effect in truth.effects.iter().filter(|effect| bin(effect.lambda) == 3 && !foreign(effect)) {
+            let named = verdict.effects.iter().filter(|claim| is(claim, effect)).map(|claim| claim.probability);
+            let listed = verdict.confusion_sets.iter().flatten().filter(|candidate| {
+                candidate.kind == effect.kind && candidate.location.as_ref().is_some_and(|place| at(place, effect))
+            });
+            probabilities.push(named.chain(listed.map(|candidate| candidate.probability)).fold(0.0, f64::max));
+        }
+    }
+    let count = probabilities.len();
+    found.mean_probability_of_true = (count > 0).then(|| probabilities.iter().sum::<f64>() / count as f64);
+    found
 }
 
 fn effect_free(truths: &[CaseTruth], verdicts: &[Verdict]) -> Vec<EffectFree> {

@@ -10,7 +10,6 @@ pub(super) mod direction_load;
 mod harmonic;
 pub mod memory;
 pub(super) mod nonlinear_torque;
-pub(super) mod root_across;
 pub(super) mod time_curve;
 pub mod torque_memory;
 pub(super) mod unequal_bend;
@@ -38,7 +37,6 @@ pub(super) fn hypotheses(site: &Site<'_>, all: &mut Vec<Hypothesis>) {
     unequal_bend::hypotheses(site, joint, all);
     unequal_seat::hypotheses(site, joint, all);
     unequal_shift::hypotheses(site, joint, all);
-    root_across::hypotheses(site, joint, all);
     nonlinear_torque::hypotheses(site, joint, all);
     torque_memory::hypotheses(site, joint, all);
     memory::hypotheses(site, joint, all);
