@@ -156,7 +156,7 @@ pub fn conditions(measurements: &[&Measurement], rows: &Rows) -> Conditions {
     let columns = Columns {
         approach,
         temperature,
-        orientation: rows.per_row == 6,
+        orientation: rows.equations.has_orientation(),
         time,
         rows: total,
         travel,

@@ -1,10 +1,9 @@
 //! Held-out errors: the gap between geometry and noise, and what the effects close of it.
 
-use statrs::distribution::{ContinuousCDF, StudentsT};
-
 use super::Analysis;
 use super::held_out::{Fold, HeldOut};
 use super::outcome::{Blocked, Gap, LeftOut};
+use crate::numerics::distribution::student_quantile;
 
 /// The folds by region, and the noise that no model goes below.
 pub(super) struct Closing<'a> {
@@ -62,8 +61,7 @@ impl<'a> Closing<'a> {
         let n = of_folds.len() as f64;
         let mean = of_folds.iter().sum::<f64>() / n;
         let variance = of_folds.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / (n - 1.0);
-        let student = StudentsT::new(0.0, 1.0, n - 1.0).ok()?;
-        let half = student.inverse_cdf(0.975) * libm::sqrt(variance / n);
+        let half = student_quantile(0.975, n - 1.0)? * libm::sqrt(variance / n);
         (n > 2.0).then_some([mean - half, mean + half])
     }
 

@@ -406,6 +406,7 @@ mod tests {
             joints: vec![0.1 + 0.2, -1e-17, 3.0],
             temperatures_c: vec![20.1, 1.0 / 3.0],
             position_m: [1.0 / 3.0, -2.0 / 7.0, 1e-9],
+            unread: [false; 3],
             orientation_xyzw: Some([0.5, -0.5, 0.5, -0.5]),
             approach: vec![-1, 0, 1],
             ambient_c: Some(20.0 + 1.0 / 3.0),

@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use kincal::measurement::Measurement;
+use kincal::seed::stream;
 use serde_json::Value;
 
 use crate::harness::kincal;
@@ -141,4 +143,71 @@ fn what_is_named_is_confirmed_by_the_physics() {
         ["diagnose", &path("gap.csv"), "--robot", &path("bare.urdf"), "--position-noise-um", "30", "--confirm", "--json"];
     let json = kincal(folder.path(), &arguments).json();
     agrees(&json, json["gap"]["noise_rms_m"].as_f64().unwrap());
+}
+
+/// A table of an arm of `robot`'s kind that only its geometry has wrong, read with uniform noise (so that no reading is far off and
+/// weighted down) in a frame of its own.
+fn clean_table(robot: &kincal::arm::Arm, orientation: bool) -> Vec<Measurement> {
+    let mut stream = stream(7, "test/diagnose/clean");
+    let mut noise = |size: f64| nalgebra::Vector3::from_fn(|_, _| stream.uniform(-size, size));
+    let base = nalgebra::Isometry3::new(noise(2.0), noise(1.5));
+    let target = nalgebra::Isometry3::new(noise(0.1), noise(1.5));
+    let mut values = robot.chain.nominal();
+    for (value, parameter) in values.iter_mut().zip(&robot.chain.parameters) {
+        *value += noise(if parameter.quantity.unit() == "m" { 1e-3 } else { 2e-3 }).x;
+    }
+    let chain = robot.chain.at(&values);
+    (0..80)
+        .map(|index| {
+            let joints: Vec<f64> = robot
+                .chain
+                .joints
+                .iter()
+                .map(|joint| 0.5 * (joint.lower + joint.upper) + 0.5 * (joint.upper - joint.lower) * noise(1.0).x)
+                .collect();
+            let pose = base * chain.forward(&joints) * target;
+            let turn = nalgebra::UnitQuaternion::from_scaled_axis(noise(3f64.sqrt() * 1e-4)) * pose.rotation;
+            Measurement {
+                index,
+                pose_id: index,
+                time_s: index as f64,
+                joints,
+                position_m: (pose.translation.vector + noise(3f64.sqrt() * 2e-5)).into(),
+                orientation_xyzw: orientation.then(|| turn.coords.into()),
+                ..Measurement::default()
+            }
+        })
+        .collect()
+}
+
+/// Every number that `identify` leaves of a reading is what `diagnose` leaves of it.
+#[test]
+fn the_geometry_is_the_one_that_identify_fits() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    let path = |name: &str| out.join(name).to_str().unwrap().to_owned();
+    let scene = "scenes/arm8.toml".to_owned();
+    kincal(out, &["export", &scene, "--to", "urdf"]).ends(0);
+    let arm = kincal::scene::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(&scene)).unwrap().scene.arm;
+    for orientation in [false, true] {
+        fs::write(path("table.csv"), kincal::measurement::table::write(&clean_table(&arm, orientation)).unwrap()).unwrap();
+        for robot in [path("arm8.urdf"), scene.clone()] {
+            let run = |command: &str| {
+                let noise = ["--position-noise-um", "20", "--attitude-noise-deg", "0.00573", "--json"];
+                kincal(out, &[&[command, &path("table.csv"), "--robot", &robot], &noise[..]].concat()).json()
+            };
+            let (identified, diagnosed) = (run("identify"), run("diagnose"));
+            let residuals = |json: &Value, key: &str| -> Vec<f64> {
+                let rows = json["residuals"].as_array().unwrap().iter();
+                rows.flat_map(|row| row[key].as_array().unwrap()[..3].iter().map(|value| value.as_f64().unwrap())).collect()
+            };
+            let (one, other) = (residuals(&identified, "identified"), residuals(&diagnosed, "before_m"));
+            let apart = one.iter().zip(&other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            println!("{robot}, orientations {orientation}: at most {apart:.1e} m apart; {}", diagnosed["sentence"]);
+            assert!(one.len() == 240 && other.len() == 240 && apart < 1e-9, "{robot}: {apart:e} m");
+            assert!(identified["converged"] == true, "{}", identified["reason"]);
+            let notes = identified["notes"].to_string();
+            assert!(!notes.contains("the calibrated file is off"), "{notes}");
+        }
+    }
 }
