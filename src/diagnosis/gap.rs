@@ -9,7 +9,7 @@ use crate::numerics::distribution::student_quantile;
 pub(super) struct Closing<'a> {
     /// By region.
     pub(super) folds: &'a [Fold],
-    /// 3-D RMS of the noise, m.
+    /// RMS length of the noise of a position, m.
     noise_rms_m: f64,
     /// In other ways.
     others: &'a [HeldOut],
@@ -22,7 +22,10 @@ impl<'a> Closing<'a> {
             Some((by_region, others)) => (by_region.folds.as_slice(), others),
             None => (&[][..], &[][..]),
         };
-        Closing { folds, noise_rms_m: libm::sqrt(3.0) * position_m, others }
+        let equations = &analysis.linear.rows.equations;
+        let read: usize = (0..equations.readings()).map(|row| equations.of_position(row).len()).sum();
+        let axes = read as f64 / equations.readings() as f64;
+        Closing { folds, noise_rms_m: libm::sqrt(axes) * position_m, others }
     }
 
     /// Of a sum over the readings of all folds.

@@ -113,6 +113,9 @@ pub fn repeats(measurements: &[&Measurement], groups: &Groups) -> Option<Repeats
     for (at, row) in in_time.iter().enumerate() {
         place[*row] = at;
     }
+    // Coordinates that every reading has.
+    let read = [0, 1, 2].map(|axis| measurements.iter().all(|row| !row.unread[axis]));
+    let axes = read.iter().filter(|read| **read).count();
     let equal = |a: &Measurement, b: &Measurement| {
         let near = |a: Option<f64>, b: Option<f64>| match (a, b) {
             (Some(a), Some(b)) => (a - b).abs() <= SAME_TEMPERATURE,
@@ -146,7 +149,9 @@ pub fn repeats(measurements: &[&Measurement], groups: &Groups) -> Option<Repeats
                     None => visits.push(vec![row]),
                 }
             }
-            let points = |rows: &[usize]| rows.iter().map(|row| measurements[*row].position().coords).collect::<Vec<_>>();
+            let point =
+                |row: &usize| Vector3::from_fn(|axis, _| if read[axis] { measurements[*row].position_m[axis] } else { 0.0 });
+            let points = |rows: &[usize]| rows.iter().map(point).collect::<Vec<_>>();
             // From the orientation of the first.
             let turns = |rows: &[usize]| -> Vec<Vector3<f64>> {
                 let orientations: Option<Vec<UnitQuaternion<f64>>> =
@@ -165,21 +170,21 @@ pub fn repeats(measurements: &[&Measurement], groups: &Groups) -> Option<Repeats
         }
     }
     // One sigma and its degrees of freedom.
-    let sigma = |squares: &[f64]| {
-        if squares.len() < CONTRASTS {
+    let sigma = |squares: &[f64], axes: usize| {
+        if squares.len() < CONTRASTS || axes == 0 {
             return None;
         }
         let mut sorted = squares.to_vec();
         sorted.sort_by(f64::total_cmp);
-        let level = sorted[sorted.len() / 2] / median(3);
-        let good: Vec<f64> = sorted.into_iter().filter(|square| *square <= rare(3) * level).collect();
-        let degrees_of_freedom = 3.0 * good.len() as f64;
+        let level = sorted[sorted.len() / 2] / median(axes);
+        let good: Vec<f64> = sorted.into_iter().filter(|square| *square <= rare(axes) * level).collect();
+        let degrees_of_freedom = axes as f64 * good.len() as f64;
         let mean = good.iter().sum::<f64>() / degrees_of_freedom;
         (mean > 0.0).then(|| (libm::sqrt(mean), degrees_of_freedom))
     };
     let noise = |squares: &[f64], turns: &[f64], moved: bool| {
-        let (position_m, degrees_of_freedom) = sigma(squares)?;
-        Some(Repeats { position_m, orientation_rad: sigma(turns).map(|(sigma, _)| sigma), degrees_of_freedom, moved })
+        let (position_m, degrees_of_freedom) = sigma(squares, axes)?;
+        Some(Repeats { position_m, orientation_rad: sigma(turns, 3).map(|(sigma, _)| sigma), degrees_of_freedom, moved })
     };
     noise(&between, &turns_between, true).or_else(|| noise(&of_visits, &turns_of_visits, false))
 }
