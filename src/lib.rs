@@ -118,6 +118,7 @@ pub mod quality;
 
 pub mod effects;
 pub mod identification;
+pub mod solver;
 
 pub mod diagnosis;
 
@@ -141,6 +142,7 @@ mod figure;
 #[cfg(feature = "cli")]
 pub mod lab;
 
+pub mod numerics;
 pub mod seed;
 pub mod statistics;
 pub mod units;

@@ -12,8 +12,7 @@ use crate::diagnosis::{self, Options};
 use crate::event::{Event, Listener, RealCell, Start};
 use crate::identification::alignment::{AlignmentError, align};
 use crate::identification::outcome::Identification;
-use crate::identification::{IdentificationError, identify};
-use crate::measurement::Weights;
+use crate::identification::{self, IdentificationError, identify};
 use crate::measurement::{Measurement, Role, Sensor};
 use crate::progress::Stopped;
 use crate::scene::{self, Scene, SceneError};
@@ -150,6 +149,8 @@ fn tell(identification: &Identification, listener: &mut dyn Listener) -> Result<
 /// A real arm in the frame in which it was measured, and its sensor.
 #[derive(Clone, Debug)]
 pub struct RealArm {
+    /// The nominal arm as its file says, from its root to its tool.
+    pub robot: Arm,
     /// The nominal arm, its base in the measurement frame and the target on its tool fitted.
     pub arm: Arm,
     /// Declared accuracy.
@@ -190,7 +191,8 @@ pub fn real_arm(real: &RealCell, robot: (Arm, Vec<String>), measurements: &[Meas
     let sensor = real_sensor(real, measurements);
     let fit: Vec<&Measurement> = measurements.iter().filter(|measurement| measurement.role == Role::Fit).collect();
     let (nominal, notes) = robot;
-    Ok(RealArm { arm: align(&nominal, &sensor, &fit)?, sensor, notes })
+    let arm = align(&nominal, &sensor, &fit)?;
+    Ok(RealArm { robot: nominal, arm, sensor, notes })
 }
 
 /// Identifies a real arm and tells the listener.
@@ -202,7 +204,7 @@ pub fn identify_real(
     measurements: &[Measurement],
     listener: &mut dyn Listener,
 ) -> Result<Identification, SessionError> {
-    let mut identification = identify(&real.arm, &real.sensor, Weights::Noise, measurements)?;
+    let mut identification = identification::identify_real(&real.robot, &real.arm, &real.sensor, measurements)?;
     let frames = "nominal means: the measurement frame and the target fitted, the robot as its file says";
     identification.notes.push(frames.to_owned());
     identification.notes.extend(real.notes.iter().cloned());

@@ -1,8 +1,9 @@
 //! What many trials say: means with their intervals, ratios, and rank correlations.
 
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ContinuousCDF, StudentsT};
 use statrs::statistics::Statistics;
+
+use crate::numerics::distribution::student_quantile;
 
 /// A mean over trials.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -99,8 +100,7 @@ impl Running {
 
 /// Student's interval about `mean` of `count` values with standard deviation `deviation`.
 fn around(mean: f64, deviation: f64, count: usize) -> Option<[f64; 2]> {
-    let distribution = StudentsT::new(0.0, 1.0, count as f64 - 1.0).ok()?;
-    let half = distribution.inverse_cdf(0.975) * deviation / (count as f64).sqrt();
+    let half = student_quantile(0.975, count as f64 - 1.0)? * deviation / (count as f64).sqrt();
     Some([mean - half, mean + half])
 }
 

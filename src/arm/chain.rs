@@ -194,10 +194,7 @@ impl Chain {
                     JointKind::Revolute => Prepared::Turn { joint: *joint },
                     JointKind::Prismatic => Prepared::Slide { joint: *joint },
                 },
-                Step::Fixed(pose) => Prepared::Fixed {
-                    rotation: pose.rotation.to_rotation_matrix().into_inner(),
-                    translation: pose.translation.vector,
-                },
+                Step::Fixed(pose) => fixed(pose),
                 Step::Frame { .. } => Prepared::Frame,
             })
             .collect();
@@ -374,6 +371,25 @@ impl ChainAt {
         segments
     }
 
+    /// Visits every joint from the base to the tool: its number, the frame in which it moves before its motion, and the same frame
+    /// after it; axes (columns) and origin (m) of both, in base. Returns the tool's.
+    pub fn visit_joints(
+        &self,
+        joints: &[f64],
+        mut visit: impl FnMut(usize, (&[Vector3<f64>; 3], &Vector3<f64>), (&[Vector3<f64>; 3], &Vector3<f64>)),
+    ) -> (Matrix3<f64>, Vector3<f64>) {
+        debug_assert_eq!(joints.len(), self.joint_count);
+        let mut walker = Walker::at_base();
+        for step in &self.steps {
+            let before = walker;
+            walker.step(step, joints);
+            if let Prepared::Turn { joint } | Prepared::Slide { joint } = step {
+                visit(*joint, (&before.axes, &before.origin), (&walker.axes, &walker.origin));
+            }
+        }
+        (Matrix3::from_columns(&walker.axes), walker.origin)
+    }
+
     /// How the tool moves per unit of each joint coordinate, base to tool: its origin's velocity (m) and its turn (rad), both in
     /// base axes, per rad or m.
     #[must_use]
@@ -449,6 +465,82 @@ impl ChainAt {
     }
 }
 
+/// The arm of a chain whose joint frames are off by six small errors each, from the second joint on: `Trans(x, y, z) Rot(z) Rot(y) Rot(x)`
+/// after the nominal frame. Complete whatever parameters the chain itself has, and regular where roll, pitch and yaw are not. The frames of
+/// the first joint and of the tool are those of base and target.
+#[derive(Clone, Debug)]
+pub struct FrameErrors {
+    segments: Vec<Prepared>,
+    kinds: Vec<JointKind>,
+}
+
+impl FrameErrors {
+    /// Parameters of a frame: x, y, z (m), then turns about z, y, x (rad).
+    pub const PER_FRAME: usize = 6;
+
+    /// Of the nominal `chain`.
+    #[must_use]
+    pub fn new(chain: &Chain) -> FrameErrors {
+        let segments = chain.at_nominal().segments().iter().map(fixed).collect();
+        FrameErrors { segments, kinds: chain.joints.iter().map(|joint| joint.kind).collect() }
+    }
+
+    /// Number of joint frames that are off.
+    #[must_use]
+    pub fn frames(&self) -> usize {
+        self.kinds.len() - 1
+    }
+
+    /// The arm with the frame errors `errors` (six each), its root at `measurement_from_root` and a target at `tool_from_target`. The
+    /// Jacobian's columns are: six of the root's pose, the frames', six of the target's pose, each in the frame itself.
+    ///
+    /// # Panics
+    /// If there are not six errors per frame.
+    #[must_use]
+    pub fn at(&self, measurement_from_root: &Pose, errors: &[f64], tool_from_target: &Pose) -> ChainAt {
+        assert_eq!(errors.len(), Self::PER_FRAME * self.frames(), "six errors per frame");
+        let count = self.kinds.len();
+        let mut steps = vec![fixed(measurement_from_root)];
+        steps.extend(six(&[0.0; 6]));
+        for (joint, kind) in self.kinds.iter().enumerate() {
+            steps.push(self.segments[joint].clone());
+            if let Some(frame) = joint.checked_sub(1) {
+                steps.extend(six(&errors[Self::PER_FRAME * frame..Self::PER_FRAME * (frame + 1)]));
+            }
+            steps.push(match kind {
+                JointKind::Revolute => Prepared::Turn { joint },
+                JointKind::Prismatic => Prepared::Slide { joint },
+            });
+        }
+        steps.push(self.segments[count].clone());
+        steps.push(fixed(tool_from_target));
+        steps.extend(six(&[0.0; 6]));
+        ChainAt { steps, parameter_count: Self::PER_FRAME * (count + 1), joint_count: count }
+    }
+
+    /// The pose that six errors make.
+    #[must_use]
+    pub fn pose(errors: &[f64]) -> Pose {
+        let mut walker = Walker::at_base();
+        six(errors).iter().for_each(|step| walker.step(step, &[]));
+        walker.pose()
+    }
+}
+
+fn fixed(pose: &Pose) -> Prepared {
+    Prepared::Fixed { rotation: pose.rotation.to_rotation_matrix().into_inner(), translation: pose.translation.vector }
+}
+
+/// As [`Chain::six_parameters`].
+fn six(errors: &[f64]) -> [Prepared; 6] {
+    let shift = |at: usize, axis: Axis| Prepared::Translate { axis, distance: errors[at] };
+    let turn = |at: usize, axis: Axis| {
+        let (sine, cosine) = libm::sincos(errors[at]);
+        Prepared::Rotate { axis, sine, cosine }
+    };
+    [shift(0, Axis::X), shift(1, Axis::Y), shift(2, Axis::Z), turn(3, Axis::Z), turn(4, Axis::Y), turn(5, Axis::X)]
+}
+
 #[inline]
 fn put(rows: &mut [f64], stride: usize, column: usize, linear: &Vector3<f64>, angular: &Vector3<f64>) {
     for axis in 0..3 {
@@ -459,8 +551,53 @@ fn put(rows: &mut [f64], stride: usize, column: usize, linear: &Vector3<f64>, an
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::arm::frames::pose_error;
     use crate::seed::stream;
+
+    /// Frame errors do what the same change of the nominal segments does, and their Jacobian is how the pose changes.
+    #[test]
+    fn frame_errors_change_the_segments_and_the_pose_as_their_jacobian_says() {
+        let mut stream = stream(2, "test/chain/frame_errors");
+        for file in crate::lab::reproduce::arms::arms().unwrap() {
+            let chain = file.scene.arm.chain;
+            let frames = FrameErrors::new(&chain);
+            let draw = |stream: &mut crate::seed::Stream| (0..6).map(|_| stream.uniform(-0.5, 0.5)).collect::<Vec<f64>>();
+            let (base, target) = (FrameErrors::pose(&draw(&mut stream)), FrameErrors::pose(&draw(&mut stream)));
+            let errors: Vec<f64> = (0..6 * frames.frames()).map(|_| stream.uniform(-0.1, 0.1)).collect();
+            let joints: Vec<f64> = chain.joints.iter().map(|of| stream.uniform(of.lower, of.upper)).collect();
+            let at = frames.at(&base, &errors, &target);
+            let nominal = chain.at_nominal();
+            let none = vec![0.0; errors.len()];
+            let difference =
+                pose_error(&frames.at(&base, &none, &target).forward(&joints), &(base * nominal.forward(&joints) * target));
+            assert!(difference.amax() < 1e-12, "{difference}");
+            for (frame, (ours, theirs)) in at.segments().iter().zip(nominal.segments()).enumerate().skip(1) {
+                if frame <= frames.frames() {
+                    let expected = theirs * FrameErrors::pose(&errors[6 * (frame - 1)..6 * frame]);
+                    assert!(pose_error(ours, &expected).amax() < 1e-12);
+                }
+            }
+            let (_, jacobian) = at.jacobian(&joints);
+            assert_eq!(jacobian.ncols(), 6 * (frames.frames() + 2));
+            let step = 1e-5;
+            for column in 0..jacobian.ncols() {
+                let moved = |by: f64| {
+                    let mut six = [0.0; 6];
+                    six[column % 6] = by;
+                    let (mut base, mut errors, mut target) = (base, errors.clone(), target);
+                    match (column / 6, frames.frames()) {
+                        (0, _) => base *= FrameErrors::pose(&six),
+                        (block, count) if block > count => target *= FrameErrors::pose(&six),
+                        (block, _) => errors[6 * (block - 1) + column % 6] += by,
+                    }
+                    frames.at(&base, &errors, &target).forward(&joints)
+                };
+                let difference = pose_error(&moved(step), &moved(-step)) / (2.0 * step);
+                assert!((difference - jacobian.column(column)).amax() < 1e-8, "column {column}: {difference}");
+            }
+        }
+    }
 
     #[test]
     fn the_joint_jacobian_is_how_the_pose_changes_with_the_joints() {

@@ -64,8 +64,8 @@ pub(crate) enum Command {
     /// Identify the geometry from a recording or a table of measurements
     #[command(after_help = "Examples:\n  kincal identify recordings/arm8-measure.mcap\n  \
         kincal identify grid.csv --robot ur5.urdf --evaluate random.csv --position-noise-um 25\n\n\
-        A table's header names columns and units: q1_rad… (or _deg), x_m, y_m, z_m (or _mm), optional qx, qy, qz, qw,\n\
-        pose_id, time_s, role (fit, held_out), temp1_c…. The measurement frame and the target on the flange are fitted.")]
+        A table's header names columns and units: q1_rad… (or _deg), x_m, y_m, z_m (or _mm; those that were\n\
+        read, a cell may be empty), optional qx, qy, qz, qw, pose_id, time_s, role (fit, held_out), temp1_c…. The measurement frame and the target on the flange are fitted.")]
     Identify(IdentifyOptions),
     /// Say which un-modelled effect causes what calibration leaves, where, and with what probability
     #[command(after_help = "Examples:\n  kincal diagnose recordings/arm8-measure.mcap\n  \

@@ -27,7 +27,7 @@
 use nalgebra::{DMatrix, SymmetricEigen};
 use rayon::prelude::*;
 
-use crate::quality::dense::{
+use crate::numerics::dense::{
     add_gram, cholesky, dot, four_dots, inverse_transposed, log_determinant, multiply, multiply_upper, packed_gram, solve_lower,
     solve_lower_transposed,
 };

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::candidates::{NothingMeasurable, Rules, Sampler};
 use super::problem::{Criterion, Request};
-use crate::quality::dense;
+use crate::numerics::dense;
 use crate::quality::evaluator::{Evaluator, comprehensive};
 use crate::quality::globality::dispersion;
 use crate::quality::information::{InformationModel, JacobianScratch};

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::objective::{ObjectiveScratch, Set};
 use super::problem::Criterion;
 use super::search::Task;
-use crate::quality::dense;
+use crate::numerics::dense;
 use crate::quality::information::Blocks;
 
 /// Changes after which V and W are computed anew, so that rounding does not pile up.

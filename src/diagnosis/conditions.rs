@@ -146,7 +146,7 @@ pub(crate) fn conditions(
     let columns = Columns {
         approach,
         temperature,
-        orientation: rows.per_row == 6,
+        orientation: rows.equations.has_orientation(),
         time,
         rows: total,
         travel,

@@ -96,7 +96,7 @@ pub(super) fn deflected(rows: &Rows, reading: &Reading, payload_kg: f64, present
     if present.is_empty() {
         return Deflected { reading: reading.clone(), displacement: [0.0; 6] };
     }
-    let orientation = rows.per_row == 6;
+    let orientation = rows.equations.has_orientation();
     let joints = reading.joints.len();
     let still = &reading.posture;
     let offset_in_tool = still.tool_axes.transpose() * (reading.target - still.tool);

@@ -1,16 +1,15 @@
 //! Held-out errors: the gap between geometry and noise, and what the effects close of it.
 
-use statrs::distribution::{ContinuousCDF, StudentsT};
-
 use super::Analysis;
 use super::held_out::{Fold, HeldOut};
 use super::outcome::{Blocked, Gap, LeftOut};
+use crate::numerics::distribution::student_quantile;
 
 /// The folds by region, and the noise that no model goes below.
 pub(super) struct Closing<'a> {
     /// By region.
     pub(super) folds: &'a [Fold],
-    /// 3-D RMS of the noise, m.
+    /// RMS length of the noise of a position, m.
     noise_rms_m: f64,
     /// In other ways.
     others: &'a [HeldOut],
@@ -23,7 +22,10 @@ impl<'a> Closing<'a> {
             Some((by_region, others)) => (by_region.folds.as_slice(), others),
             None => (&[][..], &[][..]),
         };
-        Closing { folds, noise_rms_m: libm::sqrt(3.0) * position_m, others }
+        let equations = &analysis.linear.rows.equations;
+        let read: usize = (0..equations.readings()).map(|row| equations.of_position(row).len()).sum();
+        let axes = read as f64 / equations.readings() as f64;
+        Closing { folds, noise_rms_m: libm::sqrt(axes) * position_m, others }
     }
 
     /// Of a sum over the readings of all folds.
@@ -62,8 +64,7 @@ impl<'a> Closing<'a> {
         let n = of_folds.len() as f64;
         let mean = of_folds.iter().sum::<f64>() / n;
         let variance = of_folds.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / (n - 1.0);
-        let student = StudentsT::new(0.0, 1.0, n - 1.0).ok()?;
-        let half = student.inverse_cdf(0.975) * libm::sqrt(variance / n);
+        let half = student_quantile(0.975, n - 1.0)? * libm::sqrt(variance / n);
         (n > 2.0).then_some([mean - half, mean + half])
     }
 

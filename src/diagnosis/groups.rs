@@ -4,9 +4,10 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::conditions::centre;
-use super::outliers::{MEDIAN, RARE};
+use super::outliers::{median, rare};
 use crate::arm::frames::rotation_vector;
 use crate::measurement::Measurement;
+use crate::measurement::equations::{COMPONENTS, Equations};
 
 /// Joint readings that differ by less are of one configuration, rad or m: commanded values come back rounded, or as encoders see them.
 const SAME: f64 = 2e-4;
@@ -112,6 +113,9 @@ pub fn repeats(measurements: &[&Measurement], groups: &Groups) -> Option<Repeats
     for (at, row) in in_time.iter().enumerate() {
         place[*row] = at;
     }
+    // Coordinates that every reading has.
+    let read = [0, 1, 2].map(|axis| measurements.iter().all(|row| !row.unread[axis]));
+    let axes = read.iter().filter(|read| **read).count();
     let equal = |a: &Measurement, b: &Measurement| {
         let near = |a: Option<f64>, b: Option<f64>| match (a, b) {
             (Some(a), Some(b)) => (a - b).abs() <= SAME_TEMPERATURE,
@@ -145,7 +149,9 @@ pub fn repeats(measurements: &[&Measurement], groups: &Groups) -> Option<Repeats
                     None => visits.push(vec![row]),
                 }
             }
-            let points = |rows: &[usize]| rows.iter().map(|row| measurements[*row].position().coords).collect::<Vec<_>>();
+            let point =
+                |row: &usize| Vector3::from_fn(|axis, _| if read[axis] { measurements[*row].position_m[axis] } else { 0.0 });
+            let points = |rows: &[usize]| rows.iter().map(point).collect::<Vec<_>>();
             // From the orientation of the first.
             let turns = |rows: &[usize]| -> Vec<Vector3<f64>> {
                 let orientations: Option<Vec<UnitQuaternion<f64>>> =
@@ -164,21 +170,21 @@ pub fn repeats(measurements: &[&Measurement], groups: &Groups) -> Option<Repeats
         }
     }
     // One sigma and its degrees of freedom.
-    let sigma = |squares: &[f64]| {
-        if squares.len() < CONTRASTS {
+    let sigma = |squares: &[f64], axes: usize| {
+        if squares.len() < CONTRASTS || axes == 0 {
             return None;
         }
         let mut sorted = squares.to_vec();
         sorted.sort_by(f64::total_cmp);
-        let level = sorted[sorted.len() / 2] / MEDIAN[0];
-        let good: Vec<f64> = sorted.into_iter().filter(|square| *square <= RARE[0] * level).collect();
-        let degrees_of_freedom = 3.0 * good.len() as f64;
+        let level = sorted[sorted.len() / 2] / median(axes);
+        let good: Vec<f64> = sorted.into_iter().filter(|square| *square <= rare(axes) * level).collect();
+        let degrees_of_freedom = axes as f64 * good.len() as f64;
         let mean = good.iter().sum::<f64>() / degrees_of_freedom;
         (mean > 0.0).then(|| (libm::sqrt(mean), degrees_of_freedom))
     };
     let noise = |squares: &[f64], turns: &[f64], moved: bool| {
-        let (position_m, degrees_of_freedom) = sigma(squares)?;
-        Some(Repeats { position_m, orientation_rad: sigma(turns).map(|(sigma, _)| sigma), degrees_of_freedom, moved })
+        let (position_m, degrees_of_freedom) = sigma(squares, axes)?;
+        Some(Repeats { position_m, orientation_rad: sigma(turns, 3).map(|(sigma, _)| sigma), degrees_of_freedom, moved })
     };
     noise(&between, &turns_between, true).or_else(|| noise(&of_visits, &turns_of_visits, false))
 }
@@ -194,28 +200,36 @@ fn contrasts(points: &[Vector3<f64>]) -> Vec<f64> {
         .collect()
 }
 
-/// Weights of rows whose residuals (`per_row` whitened equations each) are alike within a group: a group of `n` rows with the
+/// Weights of rows whose residuals (of all `equations`, whitened) are alike within a group: a group of `n` rows with the
 /// intraclass correlation ρ tells as much as `n / (1 + (n − 1) ρ)` independent ones. `good`: rows that are no outliers. Also ρ.
 #[must_use]
-pub fn weights(groups: &Groups, residual: &[f64], per_row: usize, good: &[bool]) -> (Vec<f64>, f64) {
-    let of = |row: usize| &residual[row * per_row..(row + 1) * per_row];
+pub fn weights(groups: &Groups, residual: &[f64], equations: &Equations, good: &[bool]) -> (Vec<f64>, f64) {
+    // What was read of a component of the pose.
+    let of = |row: usize, component: usize| {
+        let at = equations.of(row).find(|equation| equations.component(*equation) == component);
+        at.map(|equation| residual[equation])
+    };
     // Analysis of variance: within groups, and all.
-    let (mut within, mut degrees_of_freedom, mut all, mut count) = (0.0, 0.0, 0.0, 0.0);
+    let (mut within, mut of_within, mut all, mut of_all, mut degrees_of_freedom) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for rows in &groups.rows {
         let rows: Vec<usize> = rows.iter().copied().filter(|row| good[*row]).collect();
         if rows.len() < 2 {
             continue;
         }
-        for equation in 0..per_row {
-            let mean = rows.iter().map(|row| of(*row)[equation]).sum::<f64>() / rows.len() as f64;
-            for row in &rows {
-                let value = of(*row)[equation];
+        for component in 0..COMPONENTS {
+            let values: Vec<f64> = rows.iter().filter_map(|row| of(*row, component)).collect();
+            if values.len() < 2 {
+                continue;
+            }
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            for value in &values {
                 within += (value - mean) * (value - mean);
                 all += value * value;
             }
+            of_within += (values.len() - 1) as f64;
+            of_all += values.len() as f64;
         }
         degrees_of_freedom += (rows.len() - 1) as f64;
-        count += rows.len() as f64;
     }
     if degrees_of_freedom == 0.0 {
         return (vec![1.0; groups.of.len()], 0.0);
@@ -223,7 +237,7 @@ pub fn weights(groups: &Groups, residual: &[f64], per_row: usize, good: &[bool])
     let correlation = if degrees_of_freedom < PAIRS || all <= 0.0 {
         0.5
     } else {
-        (1.0 - (within / degrees_of_freedom) / (all / count)).clamp(0.0, 1.0)
+        (1.0 - (within / of_within) / (all / of_all)).clamp(0.0, 1.0)
     };
     let weight = |row: usize| 1.0 / (1.0 + (groups.rows[groups.of[row]].len() - 1) as f64 * correlation);
     ((0..groups.of.len()).map(weight).collect(), correlation)
@@ -277,13 +291,22 @@ mod tests {
         let rows: Vec<Measurement> = (0..80).map(|index| row(index, (index / 4) as f64, 0.0)).collect();
         let rows: Vec<&Measurement> = rows.iter().collect();
         let groups = groups(&rows);
+        let sensor = crate::measurement::Sensor {
+            position_in_base: nalgebra::Point3::origin(),
+            position_sigma_m: 1.0,
+            position_sigma_per_m: 0.0,
+            orientation_sigma_rad: None,
+            temperature_sigma_k: None,
+            view: None,
+        };
+        let equations = Equations::new(&sensor, &rows);
         let mut stream = stream(3, "test/repeats");
         let shared: Vec<f64> = (0..20).map(|_| stream.normal()).collect();
         let alike: Vec<f64> = (0..240).map(|at| shared[at / 12]).collect();
-        let (weights_alike, correlation) = weights(&groups, &alike, 3, &[true; 80]);
+        let (weights_alike, correlation) = weights(&groups, &alike, &equations, &[true; 80]);
         assert!((correlation - 1.0).abs() < 1e-9 && (weights_alike[0] - 0.25).abs() < 1e-9);
         let independent: Vec<f64> = (0..240).map(|_| stream.normal()).collect();
-        let (free, correlation) = weights(&groups, &independent, 3, &[true; 80]);
+        let (free, correlation) = weights(&groups, &independent, &equations, &[true; 80]);
         assert!(correlation < 0.1 && free[0] > 0.75, "{correlation}");
     }
 }

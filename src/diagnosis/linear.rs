@@ -52,7 +52,7 @@ impl<'a> Linear<'a> {
     /// What the signatures with these coefficients (column and value) do to each equation, m and rad.
     #[must_use]
     pub fn made(&self, coefficients: &[(usize, f64)]) -> DVector<f64> {
-        let per_row = self.rows.per_row;
+        let orientation = self.rows.equations.has_orientation();
         let mut made = DVector::zeros(self.residual.len());
         for (hypothesis, of) in self.candidates.hypotheses.iter().enumerate() {
             let columns = self.candidates.columns(hypothesis);
@@ -65,11 +65,11 @@ impl<'a> Linear<'a> {
                 continue;
             }
             for (row, reading) in self.readings.iter().enumerate() {
-                let moved = of.shape.columns(reading, per_row == 6);
+                let moved = of.shape.columns(reading, orientation);
                 for (at, value) in &values {
                     let factor = value * self.candidates.unit[hypothesis] * of.spread[*at];
-                    for equation in 0..per_row {
-                        made[row * per_row + equation] += moved[*at][equation] * factor;
+                    for (equation, moved) in self.rows.equations.of(row).zip(self.rows.read(row, &moved[*at])) {
+                        made[equation] += moved * factor;
                     }
                 }
             }
@@ -86,10 +86,9 @@ impl<'a> Linear<'a> {
     /// The sum of squares of the positions of `rows` (m²) with the geometry changed by `geometry` and with effects that do `made`.
     #[must_use]
     pub fn squares(&self, rows: &[usize], geometry: &DVector<f64>, made: &DVector<f64>) -> f64 {
-        let per_row = self.rows.per_row;
         let mut sum = 0.0;
         for row in rows {
-            for equation in row * per_row..row * per_row + 3 {
+            for equation in self.rows.equations.of_position(*row) {
                 let moved = self.rows.jacobian.row(equation).iter().zip(geometry.iter()).map(|(a, b)| a * b).sum::<f64>();
                 let left = self.residual[equation] - moved - made[equation];
                 sum += left * left;
@@ -107,6 +106,6 @@ impl<'a> Linear<'a> {
     /// The equations of one row.
     #[must_use]
     pub fn of_row<'v>(&self, values: &'v DVector<f64>, row: usize) -> DVectorView<'v, f64> {
-        values.rows(row * self.rows.per_row, self.rows.per_row)
+        values.rows_range(self.rows.equations.of(row))
     }
 }

@@ -1,11 +1,10 @@
 //! How large a named effect is, with its interval.
 
-use statrs::distribution::{ContinuousCDF, StudentsT};
-
 use super::Analysis;
 use super::evidence::{Fit, SCALES, one_signed};
 use super::outcome::Magnitude;
 use crate::effects::{Kind, Load};
+use crate::numerics::distribution::{NORMAL_95, student_quantile};
 
 /// The best set fitted with the widest prior there is, so that it pulls next to nothing: what magnitudes and all else that effects have
 /// are told from.
@@ -26,7 +25,7 @@ pub(super) fn magnitude(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -
     let covariance = |i: usize, j: usize| fit.noise * fit.covariance[(at[i], at[j])] * unit * unit * of.spread[i] * of.spread[j];
     let degrees_of_freedom =
         (analysis.evidence.marginal.degrees_of_freedom + analysis.evidence.noise.degrees_of_freedom).max(1.0);
-    let quantile = StudentsT::new(0.0, 1.0, degrees_of_freedom).map_or(1.96, |student| student.inverse_cdf(0.975));
+    let quantile = student_quantile(0.975, degrees_of_freedom).unwrap_or(NORMAL_95);
     let name = of.kind.map_or("", Kind::unit).to_owned();
     let load = is_driven_by_load(of.kind) && !analysis.linear.rows.mechanism.masses_known;
     let name = if load { "relative (no masses)".to_owned() } else { name };

@@ -16,6 +16,9 @@ const ROUNDS: usize = 20;
 #[must_use]
 pub fn hint(arm: &Arm, measurements: &[&Measurement]) -> String {
     let mechanism = Mechanism::new(arm);
+    // What lacks a coordinate cannot be registered.
+    let whole: Vec<&&Measurement> = measurements.iter().filter(|row| row.unread == [false; 3]).collect();
+    let measurements = if whole.is_empty() { measurements.iter().collect() } else { whole };
     let joints: Vec<Vec<f64>> = measurements.iter().map(|row| row.joints.clone()).collect();
     let points: Vec<Vector3<f64>> = measurements.iter().map(|row| row.position().coords).collect();
     let count = mechanism.joint_count();

@@ -38,14 +38,14 @@ mod unknown;
 mod verdict;
 pub mod waterfall;
 mod weights;
-pub mod whitening;
 
-use nalgebra::{DVector, Vector3};
+use nalgebra::DVector;
 
 use crate::arm::Arm;
 use crate::effects::signature::library::{Hypothesis, library, ripple};
 use crate::effects::signature::shape::Displacement;
 use crate::effects::{Kind, Location};
+use crate::identification::geometry::GeometryError;
 use crate::measurement::{Measurement, Sensor};
 use candidates::{candidates, weigh};
 use conditions::Conditions;
@@ -278,8 +278,9 @@ impl Pass {
         let mut total = rows.residual.clone();
         for (row, now) in displaced.iter().enumerate() {
             let before = state.displacement.get(row).copied().unwrap_or_default();
-            for equation in 0..rows.per_row {
-                total[row * rows.per_row + equation] += before[equation] - now[equation];
+            let less: Displacement = std::array::from_fn(|axis| before[axis] - now[axis]);
+            for (equation, value) in rows.equations.of(row).zip(rows.read(row, &less)) {
+                total[equation] += value;
             }
         }
         let linear = Linear::new(&rows, &conditions.readings, &candidates, total, state.scale);
@@ -287,7 +288,7 @@ impl Pass {
         let linear = Linear { residual: total, ..linear };
         let products = linear.products(&scheme.fold, scheme.folds);
         let Linear { residual: total, prior, .. } = linear;
-        let marginal = Marginal::new(&products, None, &prior).ok_or(DiagnosisError::Degenerate)?;
+        let marginal = Marginal::new(&products, None, &prior).ok_or(GeometryError::Degenerate)?;
         let information: Vec<f64> = (0..candidates.hypotheses.len()).map(|number| marginal.information(number)).collect();
         weigh(&mut candidates, &information);
         let evidence = Evidence { marginal: &marginal, candidates: &candidates, noise: data.noise };
@@ -306,7 +307,7 @@ impl Pass {
         let marginal = if scale == state.scale {
             &marginal
         } else {
-            again = Marginal::new(&products, None, &prior.scaled(scale)).ok_or(DiagnosisError::Degenerate)?;
+            again = Marginal::new(&products, None, &prior.scaled(scale)).ok_or(GeometryError::Degenerate)?;
             &again
         };
         let evidence = Evidence { marginal, candidates: &candidates, noise: data.noise };
@@ -400,7 +401,7 @@ pub fn diagnose(
     let data = Data::new(arm, sensor, measurements, options);
     let (state, pass) = settle(&data)?;
     let linear = pass.linear();
-    let marginal = Marginal::new(&pass.products, None, &linear.prior).ok_or(DiagnosisError::Degenerate)?;
+    let marginal = Marginal::new(&pass.products, None, &linear.prior).ok_or(GeometryError::Degenerate)?;
     let evidence = Evidence { marginal: &marginal, candidates: &pass.candidates, noise: data.noise };
     let found = search::search(&evidence, &pass.members, MOST);
     let coefficients = evidence.coefficients(&found.best);
@@ -415,17 +416,16 @@ pub fn diagnose(
             Block::Payload | Block::Session => validation.run(scheme, &linear.products(&scheme.fold, scheme.folds)),
         })
         .collect();
-    let positions = |of: &DVector<f64>| -> Vec<Vector3<f64>> {
-        (0..measurements.len()).map(|row| Vector3::from(of.fixed_rows::<3>(row * pass.rows.per_row))).collect()
-    };
     let units = data.groups.alike(measurements);
-    let structure = open_set::structure(&pass.conditions, &positions(&linear.in_sigmas(&residual)), &units);
-    let geometry_alone = linear.left(&marginal.geometry(&[]), &DVector::zeros(residual.len()));
+    let structure = open_set::structure(&pass.conditions, &pass.rows.shifts(&linear.in_sigmas(&residual)), &units);
+    // What a calibration leaves, whose prior is that of manufacturing ([`crate::identification::identify_real`]).
+    let calibrated = Marginal::new(&pass.products, None, &linear.prior.scaled(1.0)).ok_or(GeometryError::Degenerate)?;
+    let geometry_alone = linear.left(&calibrated.geometry(&[]), &DVector::zeros(residual.len()));
     let orientation_sigma_rad = sensor.orientation_sigma_rad.map(|sigma| sigma * state.orientation);
     let analysis = Analysis {
         moved: moved_most(&linear, &evidence, &found.best),
         residuals: residuals(&pass.rows, measurements, &geometry_alone, &residual),
-        maps: open_set::maps(&pass.conditions, &positions(&residual)),
+        maps: open_set::maps(&pass.conditions, &pass.rows.shifts(&residual)),
         linear: &linear,
         conditions: &pass.conditions,
         evidence,
@@ -463,7 +463,7 @@ fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
             }
         }
         let linear = pass.linear();
-        let marginal = Marginal::new(&pass.products, None, &linear.prior).ok_or(DiagnosisError::Degenerate)?;
+        let marginal = Marginal::new(&pass.products, None, &linear.prior).ok_or(GeometryError::Degenerate)?;
         let evidence = Evidence { marginal: &marginal, candidates: &pass.candidates, noise: data.noise };
         if number < last {
             let may_tell = state.scatter.is_empty() && data.orientation.is_none();
@@ -522,18 +522,19 @@ fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
 /// Readings that are far off beside what was found.
 fn outliers_of(data: &Data<'_>, pass: &Pass, found: &Found) -> outliers::Outliers {
     let squares = &pass.weighed.squares;
-    let per_row = pass.rows.per_row;
-    let mut outliers = outliers::look(squares, per_row);
+    let counts = pass.rows.equations.counts();
+    let mut outliers = outliers::look(squares, &counts);
     // What play makes of a reading whose side nobody knows says nothing about the sensor.
     let seated = |row: &usize| {
         let undecided =
             |hypothesis: usize| pass.candidates.hypotheses[hypothesis].shape.undecided(&pass.conditions.readings[*row]);
         !found.best.iter().any(|(hypothesis, _)| undecided(*hypothesis))
     };
-    let sure: Vec<f64> = (0..squares.len()).filter(seated).map(|row| squares[row]).collect();
+    let (sure, sure_counts): (Vec<f64>, Vec<usize>) =
+        (0..squares.len()).filter(seated).map(|row| (squares[row], counts[row])).unzip();
     if sure.len() < squares.len() && 2 * sure.len() >= data.measurements.len() {
         let far_off = std::mem::take(&mut outliers.rows);
-        outliers = outliers::Outliers { rows: far_off, ..outliers::look(&sure, per_row) };
+        outliers = outliers::Outliers { rows: far_off, ..outliers::look(&sure, &sure_counts) };
     }
     outliers
 }
@@ -596,7 +597,7 @@ fn moved_most(linear: &Linear<'_>, evidence: &Evidence<'_>, members: &[(usize, u
         .collect();
     (0..linear.count())
         .map(|row| {
-            let size = |member: &usize| seen[*member].fixed_rows::<3>(row * linear.rows.per_row).norm_squared();
+            let size = |member: &usize| seen[*member].rows_range(linear.rows.equations.of_position(row)).norm_squared();
             (0..members.len()).max_by(|a, b| size(a).total_cmp(&size(b)))
         })
         .collect()
@@ -606,8 +607,10 @@ fn moved_most(linear: &Linear<'_>, evidence: &Evidence<'_>, members: &[(usize, u
 fn residuals(rows: &Rows, measurements: &[&Measurement], before: &DVector<f64>, after: &DVector<f64>) -> Vec<outcome::Residual> {
     (0..measurements.len())
         .map(|row| {
-            let rotation = rows.measurement_from_root[rows.session[row]].rotation;
-            let part = |of: &DVector<f64>| (rotation * Vector3::from(of.fixed_rows::<3>(row * rows.per_row))).into();
+            let part = |of: &DVector<f64>| {
+                let [x, y, z, ..] = rows.in_measurement(row, of);
+                [x, y, z]
+            };
             outcome::Residual {
                 row: measurements[row].index,
                 position_m: measurements[row].position_m,

@@ -1,9 +1,19 @@
 //! Readings that are far off: their weights, and the evidence that there are any.
 
-/// Squares (in sigmas) beyond which one reading in a thousand lies where the noise is Gaussian, for 3 and 6 equations a row.
-pub(super) const RARE: [f64; 2] = [16.27, 22.46];
+/// Squares (in sigmas) beyond which one reading in a thousand lies where the noise is Gaussian, by the number of its equations.
+const RARE: [f64; 7] = [1.0, 10.83, 13.82, 16.27, 18.47, 20.52, 22.46];
 /// Medians of the same squares.
-pub(super) const MEDIAN: [f64; 2] = [2.366, 5.348];
+const MEDIAN: [f64; 7] = [1.0, 0.455, 1.386, 2.366, 3.357, 4.351, 5.348];
+
+/// Beyond what one square in a thousand lies where `equations` numbers have Gaussian noise, in sigmas.
+pub(super) fn rare(equations: usize) -> f64 {
+    RARE[equations.min(RARE.len() - 1)]
+}
+
+/// The median of the squares of `equations` numbers with Gaussian noise, in sigmas.
+pub(super) fn median(equations: usize) -> f64 {
+    MEDIAN[equations.min(MEDIAN.len() - 1)]
+}
 
 /// What there is of outliers.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,52 +30,51 @@ pub struct Outliers {
     pub rows: Vec<usize>,
 }
 
-fn which(per_row: usize) -> usize {
-    usize::from(per_row == 6)
-}
-
-/// The typical square of a good reading, over one sigma's.
-fn level(squares: &[f64], per_row: usize) -> f64 {
-    let mut sorted = squares.to_vec();
+/// The typical square of a good reading, over one sigma's. `counts`: equations of each.
+fn level(squares: &[f64], counts: &[usize]) -> f64 {
+    let mut sorted: Vec<f64> = squares.iter().zip(counts).map(|(square, count)| square / median(*count)).collect();
     sorted.sort_by(f64::total_cmp);
-    (sorted[sorted.len() / 2] / MEDIAN[which(per_row)]).max(1e-12)
+    sorted[sorted.len() / 2].max(1e-12)
 }
 
-/// Weights of readings with these squared residuals (Huber's, on the squares): one for all but rare ones.
+/// Weights of readings with these squared residuals, of so many equations each (Huber's, on the squares): one for all but rare ones.
 #[must_use]
-pub fn weights(squares: &[f64], per_row: usize) -> Vec<f64> {
-    let limit = RARE[which(per_row)] * level(squares, per_row);
+pub fn weights(squares: &[f64], counts: &[usize]) -> Vec<f64> {
+    let level = level(squares, counts);
     // Twice as far off counts a quarter, then less and less: an outlier tells nothing.
-    squares.iter().map(|square| if *square <= limit { 1.0 } else { (limit / square) * (limit / square) }).collect()
+    let weight = |(square, count): (&f64, &usize)| {
+        let limit = rare(*count) * level;
+        if *square <= limit { 1.0 } else { (limit / square) * (limit / square) }
+    };
+    squares.iter().zip(counts).map(weight).collect()
 }
 
-/// The evidence for outliers among readings with these squared residuals.
+/// The evidence for outliers among readings with these squared residuals, of so many equations each.
 #[must_use]
-pub fn look(squares: &[f64], per_row: usize) -> Outliers {
-    let count = per_row as f64;
-    let level = level(squares, per_row);
-    let density = |square: f64, scale: f64| libm::exp(-0.5 * square / scale) / libm::pow(scale, 0.5 * count);
+pub fn look(squares: &[f64], counts: &[usize]) -> Outliers {
+    let level = level(squares, counts);
+    let density =
+        |(square, count): (f64, usize), scale: f64| libm::exp(-0.5 * square / scale) / libm::pow(scale, 0.5 * count as f64);
+    let readings: Vec<(f64, usize)> = squares.iter().copied().zip(counts.iter().copied()).collect();
     let scales: Vec<f64> = (-6..=6).map(|step| level * libm::exp(0.08 * f64::from(step))).collect();
     let total = |share: f64, factor: f64| {
         // The level is not known well: averaged.
         let of_scale = |scale: &f64| {
-            squares
+            readings
                 .iter()
-                .map(|square| {
-                    libm::log(
-                        (1.0 - share) * density(*square, *scale) + share * density(*square, scale * factor * factor) + 1e-300,
-                    )
+                .map(|one| {
+                    libm::log((1.0 - share) * density(*one, *scale) + share * density(*one, scale * factor * factor) + 1e-300)
                 })
                 .sum::<f64>()
         };
         log_mean(&scales.iter().map(of_scale).collect::<Vec<_>>())
     };
     // Without outliers the level is that of all.
-    let mean = squares.iter().sum::<f64>() / (count * squares.len() as f64);
+    let mean = squares.iter().sum::<f64>() / counts.iter().sum::<usize>() as f64;
     let plain: Vec<f64> = (-6..=6)
         .map(|step| {
             let scale = mean.max(1e-12) * libm::exp(0.08 * f64::from(step));
-            squares.iter().map(|square| libm::log(density(*square, scale) + 1e-300)).sum::<f64>()
+            readings.iter().map(|one| libm::log(density(*one, scale) + 1e-300)).sum::<f64>()
         })
         .collect();
     let plain = log_mean(&plain);
@@ -78,13 +87,16 @@ pub fn look(squares: &[f64], per_row: usize) -> Outliers {
     let log_odds = log_mean(&grid.iter().map(|(_, _, log)| *log).collect::<Vec<_>>()) - plain + libm::log(0.04);
     let (share, factor, _) = grid.iter().copied().max_by(|a, b| a.2.total_cmp(&b.2)).unwrap_or((0.0, 1.0, 0.0));
     let probability = 1.0 / (1.0 + libm::exp(-log_odds));
-    let responsible = |square: f64| {
-        let (far, near) = (share * density(square, level * factor * factor), (1.0 - share) * density(square, level));
+    let responsible = |one: (f64, usize)| {
+        let (far, near) = (share * density(one, level * factor * factor), (1.0 - share) * density(one, level));
         if far + near > 0.0 { far / (far + near) } else { 1.0 }
     };
-    let rows: Vec<usize> =
-        if probability < 0.5 { Vec::new() } else { (0..squares.len()).filter(|row| responsible(squares[*row]) > 0.99).collect() };
-    let (n, expected) = (squares.len() as f64, squares.iter().map(|square| responsible(*square)).sum::<f64>());
+    let rows: Vec<usize> = if probability < 0.5 {
+        Vec::new()
+    } else {
+        (0..squares.len()).filter(|row| responsible(readings[*row]) > 0.99).collect()
+    };
+    let (n, expected) = (squares.len() as f64, readings.iter().map(|one| responsible(*one)).sum::<f64>());
     // Some of them are hidden among the good ones; the count is binomial (Wilson's interval).
     let p = expected / n;
     let z2 = 3.84;

@@ -10,6 +10,7 @@ use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 
 use super::evidence::{Candidates, Evidence, NoisePrior, SCALES, one_signed};
 use super::products::Marginal;
+use crate::numerics::transposed_product;
 use crate::seed::stream;
 
 /// Share of cases in which the least magnitude is named.
@@ -309,7 +310,7 @@ impl<'a> Bench<'a> {
             });
             first += width;
         }
-        let products = axes.tr_mul(&(products * &axes));
+        let products = axes.tr_mul(&transposed_product(&products, &axes));
         let factor = firm(products.clone())?.unpack();
         let mut world = World {
             members,

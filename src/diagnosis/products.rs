@@ -11,6 +11,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use super::evidence::Candidates;
 use super::rows::Rows;
 use crate::effects::signature::shape::Reading;
+use crate::numerics::gram;
 
 /// Inner products of `[geometry | signatures | residual]`, fold by fold.
 #[derive(Debug)]
@@ -127,15 +128,16 @@ impl Fold {
         own_rows: &[usize],
         columns: &[Range<usize>],
     ) -> Fold {
-        let per_row = rows.per_row;
+        let orientation = rows.equations.has_orientation();
         let (geometry, width) = (rows.jacobian.ncols(), columns.last().map_or(0, |last| last.end));
-        let equations = own_rows.len() * per_row;
+        let equations = own_rows.iter().map(|row| rows.equations.of(*row).len()).sum();
         let mut jacobian = DMatrix::zeros(equations, geometry);
         let mut signatures = DMatrix::zeros(equations, width);
         let mut left = vec![0.0; equations];
-        let mut values = vec![0.0; per_row];
-        for (at, row) in own_rows.iter().enumerate() {
-            let (from, to) = (row * per_row, at * per_row);
+        let mut to = 0;
+        for row in own_rows {
+            let (from, count) = (rows.equations.of(*row).start, rows.equations.of(*row).len());
+            let mut values = vec![0.0; count];
             for parameter in 0..geometry {
                 values.iter_mut().enumerate().for_each(|(i, value)| *value = rows.jacobian[(from + i, parameter)]);
                 rows.whitening.apply(*row, &mut values);
@@ -143,9 +145,9 @@ impl Fold {
             }
             for (hypothesis, of) in candidates.hypotheses.iter().enumerate() {
                 let unit = candidates.unit[hypothesis];
-                for (i, moved) in of.shape.columns(&readings[*row], per_row == 6).iter().enumerate() {
+                for (i, moved) in of.shape.columns(&readings[*row], orientation).iter().enumerate() {
                     let factor = unit * of.spread[i];
-                    values.iter_mut().zip(moved).for_each(|(value, moved)| *value = moved * factor);
+                    values.iter_mut().zip(rows.read(*row, moved)).for_each(|(value, moved)| *value = moved * factor);
                     rows.whitening.apply(*row, &mut values);
                     let number = columns[hypothesis].start + i;
                     values.iter().enumerate().for_each(|(i, value)| signatures[(to + i, number)] = *value);
@@ -153,17 +155,10 @@ impl Fold {
             }
             values.iter_mut().enumerate().for_each(|(i, value)| *value = residual[from + i]);
             rows.whitening.apply(*row, &mut values);
-            left[to..to + per_row].copy_from_slice(&values);
+            left[to..to + count].copy_from_slice(&values);
+            to += count;
         }
-        let normal =
-            DMatrix::from_fn(
-                geometry,
-                geometry,
-                |i, j| {
-                    if i < j { 0.0 } else { dot(column(&jacobian, i), column(&jacobian, j)) }
-                },
-            );
-        let normal = DMatrix::from_fn(geometry, geometry, |i, j| normal[(i.max(j), i.min(j))]);
+        let normal = gram(&jacobian);
         let mixed = DMatrix::from_fn(geometry, width + 1, |parameter, other| {
             let with = if other < width { column(&signatures, other) } else { left.as_slice() };
             dot(column(&jacobian, parameter), with)
@@ -175,8 +170,9 @@ impl Fold {
             .collect();
         let with_residual = (0..width).map(|number| dot(column(&signatures, number), &left)).collect();
         // A row that counts half is half an equation.
-        let weight: f64 = own_rows.iter().map(|row| rows.whitening.weights()[*row]).sum();
-        Fold { residual: dot(&left, &left), signatures, normal, mixed, own, with_residual, equations: per_row as f64 * weight }
+        let weight = |row: &usize| rows.equations.of(*row).len() as f64 * rows.whitening.weights()[*row];
+        let equations = own_rows.iter().map(weight).sum();
+        Fold { residual: dot(&left, &left), signatures, normal, mixed, own, with_residual, equations }
     }
 }
 

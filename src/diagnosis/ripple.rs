@@ -6,6 +6,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use super::linear::Linear;
 use crate::effects::signature::library::RIPPLES;
 use crate::effects::signature::shape::Shape;
+use crate::numerics::gram;
 
 /// Drop of the residual's square, in squares of the noise, from which on a ripple is worth a hypothesis: what the strongest of some
 /// thousands of ripples reaches by chance.
@@ -30,11 +31,12 @@ pub(super) fn scan(linear: &Linear<'_>, residual: &DVector<f64>, level: f64) -> 
     use rayon::prelude::*;
     let (readings, candidates) = (linear.readings, linear.candidates);
     let geometry = linear.rows.jacobian.ncols();
-    let jacobian = linear.rows.whitening.of(&linear.rows.jacobian).transpose();
+    let jacobian = linear.rows.whitening.of(&linear.rows.jacobian);
     let residual = linear.in_sigmas(residual);
-    let Some(normal) = Cholesky::new(&jacobian * jacobian.transpose() + DMatrix::identity(geometry, geometry)) else {
+    let Some(normal) = Cholesky::new(gram(&jacobian) + DMatrix::identity(geometry, geometry)) else {
         return Vec::new();
     };
+    let jacobian = jacobian.transpose();
     let lower = normal.l();
     let joints = readings.first().map_or(0, |reading| reading.joints.len());
     let known = |joint: usize, waves: u16| {
@@ -44,15 +46,12 @@ pub(super) fn scan(linear: &Linear<'_>, residual: &DVector<f64>, level: f64) -> 
         .into_par_iter()
         .filter(|joint| !readings[0].slides[*joint])
         .filter_map(|joint| {
-            let per_row = linear.rows.per_row;
             // Of each reading: what a unit turn of the joint does, against geometry, itself and the residual.
             let mut mixed = DMatrix::zeros(geometry, readings.len());
             let (mut own, mut with) = (vec![0.0; readings.len()], vec![0.0; readings.len()]);
-            for (row, reading) in readings.iter().enumerate() {
-                let moved = DVector::from_row_slice(&reading.moved(joint, 1.0)[..per_row]);
-                let moved = linear.rows.whitening.of_row(row, moved.rows(0, per_row));
-                for (axis, value) in moved.iter().enumerate() {
-                    let equation = row * per_row + axis;
+            for row in 0..readings.len() {
+                let moved = linear.rows.whitening.of_row(row, linear.rows.moved(row, joint).as_view());
+                for (value, equation) in moved.iter().zip(linear.rows.equations.of(row)) {
                     own[row] += value * value;
                     with[row] += value * residual[equation];
                     mixed.column_mut(row).axpy(*value, &jacobian.column(equation), 1.0);

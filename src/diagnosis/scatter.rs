@@ -3,18 +3,18 @@
 //! is compared with none, by marginal likelihood, and with the ripples and bumps that such scatter is mistaken for: among thousands of
 //! shapes one follows any scatter somewhat.
 
-use nalgebra::{DVector, DVectorView, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, DVectorView};
 
 use super::candidates::odds_of_one_more_nameless;
 use super::evidence::{Evidence, NoisePrior};
 use super::linear::Linear;
 use super::rows::Rows;
 use super::search::Found;
-use super::whitening::Whitening;
 use crate::effects::Kind;
 use crate::effects::signature::library::{Hypothesis, RIPPLES};
-use crate::effects::signature::posture::{Mechanism, Posture};
 use crate::effects::signature::shape::Shape;
+use crate::measurement::equations::Equations;
+use crate::solver::whitening::Whitening;
 
 /// Smallest sigma of a joint's scatter, rad or m; the others are a root of two larger each.
 const SMALLEST: f64 = 5e-6;
@@ -52,25 +52,6 @@ pub(super) fn alike(one: &[Scatter], other: &[Scatter]) -> bool {
     one.len() == other.len() && one.iter().all(|a| other.iter().any(|b| near(a, b)))
 }
 
-/// What one sigma of each of `scatter` does to the target (at `targets`, in root, m) of each row: m and, of 6 equations, rad.
-pub(super) fn displaced(
-    mechanism: &Mechanism,
-    postures: &[Posture],
-    targets: &[Vector3<f64>],
-    per_row: usize,
-    scatter: &[Scatter],
-) -> Vec<Vec<DVector<f64>>> {
-    let of_row = |(posture, target): (&Posture, &Vector3<f64>)| {
-        scatter.iter().map(|one| moved(mechanism, posture, target, per_row, one.joint) * one.sigma).collect()
-    };
-    postures.iter().zip(targets).map(of_row).collect()
-}
-
-/// What a unit move of `joint` does to `target`, m and rad.
-fn moved(mechanism: &Mechanism, posture: &Posture, target: &Vector3<f64>, per_row: usize, joint: usize) -> DVector<f64> {
-    DVector::from_row_slice(&posture.moved(joint, mechanism.slides[joint], target)[..per_row])
-}
-
 /// Whether scatter may be mistaken for it: one of thousands of ripples and bumps.
 pub(super) fn is_contested(of: &Hypothesis) -> bool {
     of.kind == Some(Kind::StrainWaveError)
@@ -98,9 +79,9 @@ pub(super) fn look(linear: &Linear<'_>, evidence: &Evidence<'_>, found: &Found, 
     }
     let mut best: (f64, Vec<Scatter>) = (0.0, Vec::new());
     for (residual, lost) in trials {
-        let all = Left::new(rows, &residual, rows.per_row);
+        let all = Left::new(rows, &residual);
         // Orientations may be less exact than they are said to be, which is no joint's doing.
-        let position = Left::new(rows, &residual, 3);
+        let position = Left::of_positions(rows, &residual);
         let mut scatter: Vec<Scatter> = Vec::new();
         let mut total = -lost;
         while scatter.len() < MOST {
@@ -123,44 +104,61 @@ pub(super) fn look(linear: &Linear<'_>, evidence: &Evidence<'_>, found: &Found, 
     best.1
 }
 
-/// What is left of the readings, or of their first equations.
+/// What is left of the readings, or of their positions.
 struct Left<'a> {
     rows: &'a Rows,
     /// Sensor noise alone.
     whitening: Whitening,
     /// m, rad.
     residual: DVector<f64>,
-    /// Equations per row.
-    per_row: usize,
+    /// What is looked at of the rows, and of each equation its number among all.
+    equations: Equations,
+    which: Vec<usize>,
 }
 
 impl<'a> Left<'a> {
-    /// The first `per_row` equations of each row.
-    fn new(rows: &'a Rows, residual: &DVector<f64>, per_row: usize) -> Left<'a> {
-        let first = |at: usize| residual[at / per_row * rows.per_row + at % per_row];
-        let residual = DVector::from_fn(per_row * rows.postures.len(), |at, _| first(at));
-        Left { rows, whitening: rows.whitening.of_sensor(per_row), residual, per_row }
+    /// Of all equations.
+    fn new(rows: &'a Rows, residual: &DVector<f64>) -> Left<'a> {
+        Left::of(rows, residual, (rows.equations.clone(), (0..rows.equations.len()).collect()))
+    }
+
+    /// Of the positions.
+    fn of_positions(rows: &'a Rows, residual: &DVector<f64>) -> Left<'a> {
+        Left::of(rows, residual, rows.equations.positions())
+    }
+
+    fn of(rows: &'a Rows, residual: &DVector<f64>, (equations, which): (Equations, Vec<usize>)) -> Left<'a> {
+        let whitening = rows.whitening.of_sensor(&equations, &which);
+        Left { rows, whitening, residual: residual.select_rows(&which), equations, which }
+    }
+
+    /// What a unit move of `joint` does to the equations of `row` that are looked at.
+    fn moved(&self, row: usize, joint: usize) -> DVector<f64> {
+        let (moved, first) = (self.rows.moved(row, joint), self.rows.equations.of(row).start);
+        DVector::from_iterator(
+            self.equations.of(row).len(),
+            self.which[self.equations.of(row)].iter().map(|at| moved[at - first]),
+        )
     }
 
     /// What makes the equations alike beside the scatter of `others`.
     fn beside(&self, others: &[Scatter]) -> Whitening {
-        let rows = self.rows;
         if others.is_empty() {
             return self.whitening.clone();
         }
-        self.whitening.clone().with(&displaced(&rows.mechanism, &rows.postures, &rows.targets, self.per_row, others))
+        let of_row = |row: usize| others.iter().map(|one| self.moved(row, one.joint) * one.sigma).collect();
+        self.whitening.clone().with(&(0..self.equations.readings()).map(of_row).collect::<Vec<_>>())
     }
 
     /// Of each row: its weight, the residual and what a unit move of `joint` does, both in sigmas beside `others`.
     fn in_sigmas(&self, others: &[Scatter], joint: usize) -> Vec<(f64, DVector<f64>, DVector<f64>)> {
-        let (rows, base) = (self.rows, self.beside(others));
-        (0..rows.postures.len())
+        let base = self.beside(others);
+        (0..self.equations.readings())
             .map(|row| {
                 let weight = base.weights()[row].max(1e-300);
-                let count = self.per_row;
-                let moved = moved(&rows.mechanism, &rows.postures[row], &rows.targets[row], count, joint);
+                let moved = self.moved(row, joint);
                 let of = |values: DVectorView<'_, f64>| base.of_row(row, values) / libm::sqrt(weight);
-                (weight, of(self.residual.rows(count * row, count)), of(moved.rows(0, count)))
+                (weight, of(self.residual.rows_range(self.equations.of(row))), of(moved.as_view()))
             })
             .collect()
     }
@@ -171,7 +169,8 @@ impl<'a> Left<'a> {
     fn value(&self, degrees_of_freedom: f64, noise: NoisePrior, others: &[Scatter], joint: usize) -> (f64, Scatter) {
         let rows = self.in_sigmas(others, joint);
         let square: f64 = rows.iter().map(|(weight, left, _)| weight * left.norm_squared()).sum();
-        let degrees = noise.degrees_of_freedom + degrees_of_freedom * self.per_row as f64 / self.rows.per_row as f64;
+        let degrees =
+            noise.degrees_of_freedom + degrees_of_freedom * self.equations.len() as f64 / self.rows.equations.len() as f64;
         let known = noise.degrees_of_freedom * noise.level;
         let values: Vec<(f64, f64)> = (0..STEPS)
             .map(|step| {
@@ -198,28 +197,34 @@ impl<'a> Left<'a> {
         let base = self.beside(others);
         let whitened = base.of_vector(&self.residual);
         let count: f64 = base.weights().iter().sum();
+        let read: Vec<usize> = (0..3).filter(|axis| self.equations.components()[*axis]).collect();
         let square = |row: usize| {
-            let left = Vector3::from(whitened.fixed_rows::<3>(self.per_row * row));
-            let in_frame = self.rows.measurement_from_root[self.rows.session[row]].rotation * left;
-            in_frame * in_frame.transpose() / count
+            let left = self.equations.pose(row, &whitened.as_slice()[self.equations.of(row)]);
+            let left = DVector::from_iterator(read.len(), read.iter().map(|axis| left[*axis]));
+            &left * left.transpose() / count
         };
-        let covariance: Matrix3<f64> = (0..self.rows.postures.len()).map(square).sum();
-        let round = libm::pow(covariance.trace() / 3.0, 3.0).max(1e-300);
-        0.5 * count * libm::log(round / covariance.determinant().max(1e-12 * round)) - 2.5 * libm::log(count)
+        let zero = DMatrix::zeros(read.len(), read.len());
+        let covariance = (0..self.equations.readings()).map(square).fold(zero, |sum, one| sum + one);
+        let axes = read.len() as f64;
+        let round = libm::pow(covariance.trace() / axes, axes).max(1e-300);
+        // Sizes and directions of an ellipsoid, but for its mean size.
+        let added = 0.5 * axes * (axes + 1.0) - 1.0;
+        0.5 * count * libm::log(round / covariance.determinant().max(1e-12 * round)) - 0.5 * added * libm::log(count)
     }
 
     /// By how many standard deviations the positions beside `others` point along the motion of `joint` rather than anywhere, whatever
     /// their size: some readings that are far off are no scatter (a sign test in space). Readings that are alike count once.
     fn along(&self, others: &[Scatter], joint: usize) -> f64 {
-        let (mut sum, mut count) = (0.0, 0.0);
+        let (mut sum, mut variance) = (0.0, 0.0);
         for (weight, left, moved) in self.in_sigmas(others, joint) {
             let size = left.norm_squared() * moved.norm_squared();
             if size > 0.0 {
-                // The square of a cosine to a random direction is 1/3 in the mean, with the variance 4/45.
-                sum += weight * (left.dot(&moved) * left.dot(&moved) / size - 1.0 / 3.0);
-                count += weight;
+                // Mean and variance of the square of a cosine to a random direction: of three axes 1/3 and 4/45.
+                let axes = left.len() as f64;
+                sum += weight * (left.dot(&moved) * left.dot(&moved) / size - 1.0 / axes);
+                variance += weight * 2.0 * (axes - 1.0) / (axes * axes * (axes + 2.0));
             }
         }
-        sum / libm::sqrt(count * 4.0 / 45.0).max(1e-12)
+        sum / libm::sqrt(variance).max(1e-12)
     }
 }

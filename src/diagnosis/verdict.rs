@@ -54,8 +54,11 @@ fn noise_floor(analysis: &Analysis<'_>) -> NoiseFloor {
     };
     // In the same proportion to that of the positions as what is left of them.
     let proportion = position_m / analysis.sigma_m();
-    let rotation_rad =
-        analysis.sensor.orientation_sigma_rad.filter(|_| analysis.linear.rows.per_row == 6).map(|sigma| sigma * proportion);
+    let rotation_rad = analysis
+        .sensor
+        .orientation_sigma_rad
+        .filter(|_| analysis.linear.rows.equations.has_orientation())
+        .map(|sigma| sigma * proportion);
     NoiseFloor { position_m, rotation_rad, source }
 }
 

@@ -57,7 +57,7 @@ impl<'a> Waterfall<'a> {
             let weights = &waterfall.weights;
             let rows = rows::fit(arm, Readings { sensor, measurements, weights, displacement: &displacement, scatter: &[] })?;
             let weighed = weights::weigh(&rows, &rows.residual, weights, &groups);
-            let outliers = outliers::look(&weighed.squares, rows.per_row).rows;
+            let outliers = outliers::look(&weighed.squares, &rows.equations.counts()).rows;
             waterfall.good = (0..total).map(|row| !outliers.contains(&row)).collect();
             waterfall.weights = weighed.far.iter().zip(&weighed.dependent).map(|(a, b)| a * b).collect();
             waterfall.conditions = conditions::conditions(measurements, &rows, &[], Loads::AsItStands).0;
@@ -80,7 +80,7 @@ impl<'a> Waterfall<'a> {
     #[must_use]
     pub fn displacements(&self, effect: &Effect) -> Option<Vec<Displacement>> {
         let signature = effect.signature.as_ref()?;
-        let orientation = self.rows.per_row == 6;
+        let orientation = self.rows.equations.has_orientation();
         self.conditions.readings.iter().map(|reading| signature.displacement(reading, orientation)).collect()
     }
 
@@ -104,7 +104,7 @@ impl<'a> Waterfall<'a> {
                     Readings { sensor, measurements, weights: &weights, displacement: displacements, scatter: &[] },
                 )?;
                 let counted: Vec<usize> = (0..measurements.len()).filter(|row| held(row) && self.good[*row]).collect();
-                let square = |row: &usize| fitted.residual.fixed_rows::<3>(row * fitted.per_row).norm_squared();
+                let square = |row: &usize| fitted.residual.rows_range(fitted.equations.of_position(*row)).norm_squared();
                 Ok((counted.iter().map(square).sum::<f64>(), counted.len()))
             })
             .collect::<Result<_, DiagnosisError>>()?;

@@ -1,5 +1,7 @@
 //! How much each reading tells beside a model: less where it is far off, and where others tell the same.
 
+use std::ops::Range;
+
 use nalgebra::DVector;
 
 use super::groups::{self, Groups, Repeats};
@@ -23,12 +25,14 @@ pub(super) struct Weighed {
 pub(super) fn weigh(rows: &Rows, residual: &DVector<f64>, before: &[f64], groups: &Groups) -> Weighed {
     // In declared sigmas, whatever a row's weight.
     let whitened = rows.whitening.of_vector(residual);
-    let sigmas: Vec<f64> =
-        whitened.iter().enumerate().map(|(equation, value)| value / libm::sqrt(before[equation / rows.per_row])).collect();
-    let squares: Vec<f64> = sigmas.chunks(rows.per_row).map(|row| row.iter().map(|value| value * value).sum::<f64>()).collect();
-    let far = outliers::weights(&squares, rows.per_row);
+    let equations = &rows.equations;
+    let of_row = |row: usize| whitened.as_slice()[equations.of(row)].iter().map(move |value| value / libm::sqrt(before[row]));
+    let sigmas: Vec<f64> = (0..before.len()).flat_map(of_row).collect();
+    let squares: Vec<f64> =
+        (0..before.len()).map(|row| sigmas[equations.of(row)].iter().map(|value| value * value).sum::<f64>()).collect();
+    let far = outliers::weights(&squares, &equations.counts());
     let near: Vec<bool> = far.iter().map(|weight| *weight > 0.5).collect();
-    let (dependent, correlation) = groups::weights(groups, &sigmas, rows.per_row, &near);
+    let (dependent, correlation) = groups::weights(groups, &sigmas, equations, &near);
     Weighed { squares, far, dependent, correlation }
 }
 
@@ -53,18 +57,24 @@ pub(super) fn orientation_of_repeats(sensor: &Sensor, repeats: Option<Repeats>, 
 /// nor next to nothing: one of them is not what it is said to be (estimation of variance components, Helmert 1907, here by medians). None
 /// where so much is left that it is not noise. `known`: that it is not as said is known already, and by how much is asked.
 pub(super) fn orientation_over_position(rows: &Rows, residual: &DVector<f64>, known: bool) -> Option<f64> {
-    if rows.per_row != 6 {
+    let equations = &rows.equations;
+    if !equations.has_orientation() {
         return None;
     }
     let whitened = rows.whitening.of_vector(residual);
     let counts: Vec<usize> = (0..rows.postures.len()).filter(|row| rows.whitening.weights()[*row] > 0.3).collect();
-    let level = |first: usize| {
-        let square = |row: &usize| whitened.rows(6 * row + first, 3).norm_squared() / rows.whitening.weights()[*row];
+    let level = |part: &dyn Fn(usize) -> Range<usize>| {
+        let square = |row: &usize| {
+            let part = part(*row);
+            let usual = outliers::median(part.len()) * rows.whitening.weights()[*row];
+            whitened.rows_range(part).norm_squared() / usual
+        };
         let mut squares: Vec<f64> = counts.iter().map(square).collect();
         squares.sort_by(f64::total_cmp);
-        squares.get(squares.len() / 2).map_or(0.0, |middle| middle / outliers::MEDIAN[0])
+        squares.get(squares.len() / 2).copied().unwrap_or(0.0)
     };
-    let (position, orientation) = (level(0), level(3));
+    let position = level(&|row| equations.of_position(row));
+    let orientation = level(&|row| equations.of_position(row).end..equations.of(row).end);
     if position <= 0.0 || orientation <= 0.0 || position.min(orientation) > NO_NOISE {
         return None;
     }

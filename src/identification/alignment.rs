@@ -41,9 +41,16 @@ pub fn align(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement]) -> Resul
     }
     let nominal = arm.chain.at_nominal();
     let poses: Vec<_> = measurements.iter().map(|measurement| nominal.forward(&measurement.joints)).collect();
-    let measured: Vec<Vector3<f64>> = measurements.iter().map(|measurement| measurement.position().coords).collect();
-    let predicted: Vec<Vector3<f64>> = poses.iter().map(|pose| pose.translation.vector).collect();
-    let registered = registration(&predicted, &measured).ok_or(AlignmentError::Degenerate)?;
+    let register = |rows: &dyn Fn(&&Measurement) -> bool| {
+        let (predicted, measured): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) = (measurements.iter().zip(&poses))
+            .filter(|(row, _)| rows(row))
+            .map(|(row, pose)| (pose.translation.vector, row.position().coords))
+            .unzip();
+        if measured.is_empty() { None } else { registration(&predicted, &measured) }
+    };
+    // A coordinate that was not read is taken as zero where there are no others: near enough to begin with.
+    let registered =
+        register(&|row| row.unread == [false; 3]).or_else(|| register(&|_| true)).ok_or(AlignmentError::Degenerate)?;
     let (rotation, translation) = (registered.rotation, registered.translation.vector);
 
     let mut aligned = arm.clone();

@@ -1,23 +1,21 @@
-//! Gauss–Newton / Levenberg–Marquardt on the identifiable subspace (eqs. 5–7, on the parameters that can be told apart).
+//! Least squares on the identifiable subspace (eqs. 5–7, on the parameters that can be told apart), and what it says of the arm.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3, Vector6};
-use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 
+use super::geometry::GeometryError;
 use super::outcome::{Combination, DeclaredNoise, Errors, Identification, ParameterEstimate, Residual, Summary};
 use crate::arm::Arm;
 use crate::arm::ChainAt;
 use crate::arm::frames::{Pose, pose_error};
-use crate::measurement::Weights;
-use crate::measurement::{Measurement, Sensor};
+use crate::measurement::equations::Equations;
+use crate::measurement::{Measurement, Role, Sensor, Weights};
+use crate::numerics::distribution::{NORMAL_95, chi_squared_tail, student_quantile};
+use crate::numerics::{gram, product, scaled_inverse};
 use crate::quality::subspace::{Subspace, late};
+use crate::solver::{Linearised, Problem, solve_from};
 
 /// Steps after which a fit that has not settled is given up.
-const MAX_STEPS: usize = 200;
-/// The fit has converged when an undamped step changes the predictions of all measurements together by less than this many sigmas
-/// (of the declared noise, or of the residuals where these are larger).
-const STEP_TOLERANCE: f64 = 1e-6;
-/// Relative change of the sum of squares that counts as rounding.
-const ROUNDING: f64 = 1e-12;
+pub(super) const MAX_STEPS: usize = 200;
 /// A combination whose standard error would be above this (m or rad) cannot be told from this data: nobody's nominal arm is that
 /// wrong, and letting it loose only spoils the fit.
 const PLAUSIBLE_ERROR: f64 = 0.03;
@@ -64,6 +62,9 @@ pub enum IdentificationError {
         /// Joints.
         expected: usize,
     },
+    /// A geometry that cannot be fitted.
+    #[error(transparent)]
+    Geometry(#[from] GeometryError),
     /// Weighting by noise that is declared as zero.
     #[error(
         "the declared {what} noise is zero, so that residuals cannot be weighted by it: declare the sensor's noise, or use \
@@ -91,14 +92,9 @@ pub fn identify(
     weights: Weights,
     measurements: &[Measurement],
 ) -> Result<Identification, IdentificationError> {
-    let structure = Subspace::of_structure(arm, sensor.orientation_sigma_rad.is_some() && measures_orientation(measurements));
+    let fit: Vec<&Measurement> = measurements.iter().filter(|measurement| measurement.role == Role::Fit).collect();
+    let structure = Subspace::of_components(arm, Equations::new(sensor, &fit).components());
     identify_on(&structure, arm, sensor, weights, measurements)
-}
-
-/// Whether every measurement to fit has an orientation: else positions are fitted only.
-fn measures_orientation(measurements: &[Measurement]) -> bool {
-    let mut fitted = measurements.iter().filter(|measurement| measurement.role == crate::measurement::Role::Fit);
-    fitted.all(|measurement| measurement.orientation_xyzw.is_some())
 }
 
 /// [`identify`] for many sets of measurements of one arm, whose structure (for what is measured of a pose) is told once.
@@ -112,50 +108,38 @@ pub fn identify_on(
     weights: Weights,
     measurements: &[Measurement],
 ) -> Result<Identification, IdentificationError> {
-    use crate::measurement::Role;
-    for measurement in measurements {
-        if measurement.joints.len() != arm.joint_count() {
-            return Err(IdentificationError::JointCount {
-                index: measurement.index,
-                found: measurement.joints.len(),
-                expected: arm.joint_count(),
-            });
-        }
-    }
-    let of = |role| measurements.iter().filter(|measurement| measurement.role == role).collect::<Vec<_>>();
-    let (fit, held_out) = (of(Role::Fit), of(Role::HeldOut));
-    let problem = Problem::new(arm, sensor, weights, &fit)?;
+    check_joints(arm, measurements)?;
+    let fit: Vec<&Measurement> = measurements.iter().filter(|measurement| measurement.role == Role::Fit).collect();
+    let problem = Plain::new(arm, sensor, weights, &fit)?;
     let nominal = arm.chain.nominal();
 
-    let equations = problem.equations();
+    let equations = problem.equations.len();
     let structural = structure.rank();
-    if equations < structural {
-        let needed = structural.div_ceil(problem.rows_per_pose);
-        return Err(IdentificationError::TooFew { poses: fit.len(), equations, rank: structural, needed });
-    }
+    problem.enough(structural)?;
 
     // How large the noise really is shows only in the residuals, and with it which combinations drown in it: the fit is made again
     // without the weakest until none does. What is far beyond the noise is the wrong robot, not noise.
     let mut limit = usize::MAX;
-    let (subspace, solution, noise, scale, covariance) = loop {
+    let (subspace, solution, covariance) = loop {
         let start = problem.linearise(&nominal);
         let subspace = Subspace::reveal(&problem.in_sigmas(&start.jacobian), &late(arm), 1.0 / PLAUSIBLE_ERROR, limit);
-        let solution = solve(&problem, &subspace.independent, nominal.clone(), start);
-        let noise = problem.noise_scale(&solution.values);
+        let solution = solve_from(&problem, &subspace.independent, nominal.clone(), start, MAX_STEPS);
+        let chain = arm.chain.at(&solution.point);
+        let noise = problem.noise_scale(&|measurement| chain.forward(&measurement.joints));
         let degrees_of_freedom = equations - subspace.rank();
-        let scale = if degrees_of_freedom > 0 { (noise.sum_of_squares / degrees_of_freedom as f64).sqrt() } else { 1.0 };
-        let covariance = problem.covariance(&solution.jacobian, &subspace);
+        let scale = noise.scale(degrees_of_freedom);
+        let covariance = problem.covariance(&solution.linearised.jacobian, &subspace, None);
         let grown = if noise.known && scale.is_finite() { scale.clamp(1.0, LARGEST_NOISE_FACTOR) } else { 1.0 };
         let hopeless = |variance: &f64| variance.is_nan() || grown * variance.sqrt() > PLAUSIBLE_ERROR;
         let drowned = covariance.diagonal().iter().any(hopeless);
         if drowned && subspace.rank() > 0 {
             limit = subspace.rank() - 1;
         } else {
-            break (subspace, solution, noise, scale, covariance);
+            break (subspace, solution, covariance);
         }
     };
     // The shares of the dropped parameters where the fit has ended, for large errors have turned them.
-    let subspace = subspace.at(&solution.jacobian);
+    let subspace = subspace.at(&solution.linearised.jacobian);
     let rank = subspace.rank();
     let mut notes = Vec::new();
     if rank < structural {
@@ -169,11 +153,66 @@ pub fn identify_on(
             if names.is_empty() { "more".to_owned() } else { names.join(", ") }
         ));
     }
-    let degrees_of_freedom = equations - rank;
-    let p_value = match (degrees_of_freedom, ChiSquared::new(degrees_of_freedom as f64)) {
-        (1.., Ok(distribution)) => distribution.sf(noise.sum_of_squares),
-        _ => 1.0,
+    let chain = arm.chain.at(&solution.point);
+    let solved = Solved {
+        values: &solution.point,
+        predict: &|measurement| chain.forward(&measurement.joints),
+        degrees_of_freedom: equations - rank,
+        subspace,
+        covariance,
+        converged: solution.converged(),
+        reason: solution.stop.to_string(),
+        steps: solution.steps,
+        notes,
     };
+    Ok(conclude(&problem, weights, measurements, solved))
+}
+
+/// Whether every measurement has a reading of each joint.
+pub(super) fn check_joints(arm: &Arm, measurements: &[Measurement]) -> Result<(), IdentificationError> {
+    let expected = arm.joint_count();
+    match measurements.iter().find(|measurement| measurement.joints.len() != expected) {
+        Some(other) => Err(IdentificationError::JointCount { index: other.index, found: other.joints.len(), expected }),
+        None => Ok(()),
+    }
+}
+
+/// A fit whose outcome is to be told.
+pub(super) struct Solved<'a> {
+    /// Of all parameters.
+    pub(super) values: &'a [f64],
+    /// The identified arm.
+    pub(super) predict: &'a dyn Fn(&Measurement) -> Pose,
+    /// Equations that the parameters leave.
+    pub(super) degrees_of_freedom: usize,
+    /// With the shares at the solution.
+    pub(super) subspace: Subspace,
+    /// Of the independent parameters.
+    pub(super) covariance: DMatrix<f64>,
+    pub(super) converged: bool,
+    pub(super) reason: String,
+    pub(super) steps: usize,
+    pub(super) notes: Vec<String>,
+}
+
+/// The outcome of a fit: errors, standard errors and intervals, and what is to be doubted. `measurements`: fitted and held out.
+pub(super) fn conclude(
+    problem: &Plain<'_>,
+    weights: Weights,
+    measurements: &[Measurement],
+    solved: Solved<'_>,
+) -> Identification {
+    let arm = problem.arm;
+    let nominal = arm.chain.nominal();
+    let of = |role| measurements.iter().filter(|measurement| measurement.role == role).collect::<Vec<_>>();
+    let (fit, held_out) = (of(Role::Fit), of(Role::HeldOut));
+    let equations = problem.equations.len();
+    let Solved { values, predict, degrees_of_freedom, subspace, covariance, .. } = solved;
+    let mut notes = solved.notes;
+    let rank = subspace.rank();
+    let noise = problem.noise_scale(predict);
+    let scale = noise.scale(degrees_of_freedom);
+    let p_value = chi_squared_tail(noise.sum_of_squares, degrees_of_freedom as f64);
     // Only residuals weighted by their noise have this distribution.
     let tested = noise.known && degrees_of_freedom > 0 && weights == Weights::Noise;
     let inflated = tested && p_value < DECLARED_NOISE_REJECTED;
@@ -193,12 +232,8 @@ pub fn identify_on(
     if degrees_of_freedom == 0 {
         notes.push("as many equations as parameters: nothing is left to tell how good the fit is".to_owned());
     }
-    let quantile = match StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1) as f64) {
-        Ok(distribution) if inflated => distribution.inverse_cdf(0.975),
-        _ => 1.959_963_984_540_054,
-    };
-    // Its last digits depend on the platform's mathematics, recordings must not.
-    let quantile = (quantile * 1e9).round() * 1e-9;
+    let student = student_quantile(0.975, degrees_of_freedom.max(1) as f64).filter(|_| inflated);
+    let quantile = student.unwrap_or(NORMAL_95);
     let factor = if inflated { scale } else { 1.0 };
     let standard_error = |position: usize| factor * covariance[(position, position)].max(0.0).sqrt();
 
@@ -212,7 +247,7 @@ pub fn identify_on(
             ParameterEstimate {
                 name: parameter.name.clone(),
                 nominal: parameter.nominal,
-                identified: solution.values[column],
+                identified: values[column],
                 standard_error: position.map(standard_error),
                 unit: parameter.quantity.unit().to_owned(),
                 dropped: position.is_none(),
@@ -224,7 +259,7 @@ pub fn identify_on(
         .iter()
         .enumerate()
         .map(|(position, &column)| {
-            let estimate = solution.values[column] - nominal[column];
+            let estimate = values[column] - nominal[column];
             let error = standard_error(position);
             Combination {
                 name: arm.chain.parameters[column].name.clone(),
@@ -237,30 +272,31 @@ pub fn identify_on(
         })
         .collect();
 
-    let (at_nominal, at_identified) = (arm.chain.at(&nominal), arm.chain.at(&solution.values));
+    let at_nominal = arm.chain.at(&nominal);
+    let at_nominal = |measurement: &Measurement| at_nominal.forward(&measurement.joints);
     let residuals: Vec<Residual> = measurements
         .iter()
         .map(|measurement| Residual {
             index: measurement.index,
             position_m: measurement.position_m,
-            nominal: residual(measurement, &at_nominal).into(),
-            identified: residual(measurement, &at_identified).into(),
+            nominal: difference(measurement, &at_nominal(measurement)).into(),
+            identified: difference(measurement, &predict(measurement)).into(),
         })
         .collect();
-    let fitted = errors(&fit, &at_identified);
+    let fitted = errors_of(&fit, predict);
     // Least squares also comes to rest in places that have nothing to do with the arm.
     let far = fitted.position_m.rms > ASTRAY || fitted.rotation_rad.is_some_and(|rotation| rotation.rms > ASTRAY);
     let astray = noise.known && scale > LARGEST_NOISE_FACTOR && far;
     let reason = if rank == 0 {
         "these configurations tell nothing apart".to_owned()
-    } else if solution.converged && astray {
+    } else if solved.converged && astray {
         format!("the fit came to rest where {:.0} mm RMS are left: this is no calibration", fitted.position_m.rms * 1e3)
     } else {
-        solution.reason
+        solved.reason
     };
-    let held_out_errors = (!held_out.is_empty()).then(|| errors(&held_out, &at_identified));
-    let held_out_nominal = (!held_out.is_empty()).then(|| errors(&held_out, &at_nominal));
-    notes.extend(doubts(arm, &solution.values, &fit, &at_identified, &fitted));
+    let held_out_errors = (!held_out.is_empty()).then(|| errors_of(&held_out, predict));
+    let held_out_nominal = (!held_out.is_empty()).then(|| errors_of(&held_out, &at_nominal));
+    notes.extend(doubts(arm, values, &fit, predict, &fitted));
     match (&held_out_errors, &held_out_nominal) {
         (Some(after), Some(before)) => {
             if after.position_m.rms >= before.position_m.rms {
@@ -276,39 +312,45 @@ pub fn identify_on(
         }
         _ => notes.push("nothing is held out: the errors of fitted configurations flatter".to_owned()),
     }
-    Ok(Identification {
-        converged: solution.converged && rank > 0 && !astray,
+    Identification {
+        converged: solved.converged && rank > 0 && !astray,
         reason,
-        iterations: solution.steps,
+        iterations: solved.steps,
         rank,
         equations,
         residual_scale: (noise.known && degrees_of_freedom > 0).then_some(scale),
         parameters,
         combinations,
-        nominal: errors(&fit, &at_nominal),
+        nominal: errors_of(&fit, &at_nominal),
         fitted,
         held_out: held_out_errors,
         held_out_nominal,
         declared_noise: DeclaredNoise { position_m: noise.position_m, rotation_rad: noise.rotation_rad },
         residuals,
         notes,
-    })
+    }
 }
 
 /// The nominal values of `arm` with the parameters `free` (columns) fitted to `measurements` and all others held; `None` if that
 /// does not converge. For frames that nobody has measured, such as the measurement frame and the target on the flange.
 pub fn fit_some(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], free: &[usize]) -> Option<Vec<f64>> {
-    let problem = Problem::new(arm, sensor, Weights::Noise, measurements).ok()?;
+    let problem = Plain::new(arm, sensor, Weights::Noise, measurements).ok()?;
     let nominal = arm.chain.nominal();
     let start = problem.linearise(&nominal);
     let seen = Subspace::reveal(&start.jacobian.select_columns(free), &vec![false; free.len()], 0.0, usize::MAX);
     let columns: Vec<usize> = seen.independent.iter().map(|position| free[*position]).collect();
-    let solution = solve(&problem, &columns, nominal, start);
-    solution.converged.then_some(solution.values)
+    let solution = solve_from(&problem, &columns, nominal, start, MAX_STEPS);
+    solution.converged().then_some(solution.point)
 }
 
 /// What a careful reader would doubt about a fit: absurd parameters, single wild readings.
-fn doubts(arm: &Arm, values: &[f64], fit: &[&Measurement], identified: &ChainAt, fitted: &Errors) -> Vec<String> {
+fn doubts(
+    arm: &Arm,
+    values: &[f64],
+    fit: &[&Measurement],
+    predict: &dyn Fn(&Measurement) -> Pose,
+    fitted: &Errors,
+) -> Vec<String> {
     let mut doubts = Vec::new();
     let changes = arm.chain.parameters.iter().zip(values).map(|(parameter, value)| (parameter, value - parameter.nominal));
     let far = changes.max_by(|(_, a), (_, b)| a.abs().total_cmp(&b.abs()));
@@ -320,8 +362,8 @@ fn doubts(arm: &Arm, values: &[f64], fit: &[&Measurement], identified: &ChainAt,
             parameter.quantity.unit()
         ));
     }
-    let mut wild: Vec<(f64, &&Measurement)> =
-        fit.iter().map(|measurement| (residual(measurement, identified).fixed_rows::<3>(0).norm(), measurement)).collect();
+    let off = |measurement: &Measurement| difference(measurement, &predict(measurement)).fixed_rows::<3>(0).norm();
+    let mut wild: Vec<(f64, &&Measurement)> = fit.iter().map(|measurement| (off(measurement), measurement)).collect();
     wild.sort_by(|(a, _), (b, _)| b.total_cmp(a));
     // Against the median, which a few wild readings do not move.
     let usual = wild.get(wild.len() / 2).map_or(0.0, |(length, _)| *length).max(fitted.position_m.min);
@@ -344,7 +386,13 @@ fn doubts(arm: &Arm, values: &[f64], fit: &[&Measurement], identified: &ChainAt,
 /// Errors of the model `chain` on `measurements`.
 #[must_use]
 pub fn errors(measurements: &[&Measurement], chain: &ChainAt) -> Errors {
-    let residuals: Vec<Vector6<f64>> = measurements.iter().map(|measurement| residual(measurement, chain)).collect();
+    errors_of(measurements, &|measurement| chain.forward(&measurement.joints))
+}
+
+/// Errors of what `predict` says of `measurements`.
+fn errors_of(measurements: &[&Measurement], predict: &dyn Fn(&Measurement) -> Pose) -> Errors {
+    let residuals: Vec<Vector6<f64>> =
+        measurements.iter().map(|measurement| difference(measurement, &predict(measurement))).collect();
     let orientation = measurements.iter().all(|measurement| measurement.orientation_xyzw.is_some());
     Errors {
         count: measurements.len(),
@@ -370,37 +418,30 @@ pub fn summary(values: impl Iterator<Item = f64>) -> Summary {
     Summary { min, mean: sum / count as f64, rms: (squares / count as f64).sqrt(), max }
 }
 
-/// Measured minus predicted pose; the rotation part is zero where no orientation was measured.
-fn residual(measurement: &Measurement, chain: &ChainAt) -> Vector6<f64> {
-    let predicted = chain.forward(&measurement.joints);
-    match measurement.orientation() {
-        Some(orientation) => pose_error(&Pose::from_parts(measurement.position().into(), orientation), &predicted),
+/// Measured minus predicted pose (m, rad); zero in what was not read.
+pub(super) fn difference(measurement: &Measurement, predicted: &Pose) -> Vector6<f64> {
+    let mut error = match measurement.orientation() {
+        Some(orientation) => pose_error(&Pose::from_parts(measurement.position().into(), orientation), predicted),
         None => {
             let difference = measurement.position().coords - predicted.translation.vector;
             Vector6::new(difference.x, difference.y, difference.z, 0.0, 0.0, 0.0)
         }
+    };
+    for (axis, unread) in measurement.unread.iter().enumerate() {
+        if *unread {
+            error[axis] = 0.0;
+        }
     }
+    error
 }
 
-struct Problem<'a> {
+/// The parameters of `arm`'s chain, without a prior.
+pub(super) struct Plain<'a> {
     arm: &'a Arm,
     measurements: &'a [&'a Measurement],
-    rows_per_pose: usize,
-    /// Weight and declared sigma of the position and the orientation rows of each measurement.
-    rows: Vec<RowWeights>,
-}
-
-#[derive(Clone, Copy)]
-struct RowWeights {
-    weight: [f64; 2],
-    sigma: [f64; 2],
-}
-
-struct Linearised {
-    /// Weighted residuals, measured minus predicted.
-    residuals: DVector<f64>,
-    /// Weighted change of the prediction per parameter (all columns).
-    jacobian: DMatrix<f64>,
+    equations: Equations,
+    /// Weight of each equation.
+    weights: Vec<f64>,
 }
 
 struct NoiseScale {
@@ -411,85 +452,57 @@ struct NoiseScale {
     rotation_rad: Option<f64>,
 }
 
-impl<'a> Problem<'a> {
-    fn new(
+impl NoiseScale {
+    /// Root mean square of the residuals in declared sigmas, `degrees_of_freedom` of them; one where none is left.
+    fn scale(&self, degrees_of_freedom: usize) -> f64 {
+        if degrees_of_freedom > 0 { (self.sum_of_squares / degrees_of_freedom as f64).sqrt() } else { 1.0 }
+    }
+}
+
+impl<'a> Plain<'a> {
+    pub(super) fn new(
         arm: &'a Arm,
         sensor: &Sensor,
         weights: Weights,
         measurements: &'a [&'a Measurement],
     ) -> Result<Self, IdentificationError> {
-        // Mixed data are fitted as what all of them have.
-        let orientation = sensor.orientation_sigma_rad.is_some()
-            && measurements.iter().all(|measurement| measurement.orientation_xyzw.is_some());
-        let rows = measurements
-            .iter()
-            .map(|measurement| {
-                let sigma = [
-                    sensor.position_sigma_at(&measurement.position().coords),
-                    if orientation { sensor.orientation_sigma_rad.unwrap_or(0.0) } else { 1.0 },
-                ];
-                let weight = match weights {
-                    Weights::Unit => [1.0, 1.0],
-                    Weights::Noise => {
-                        for (sigma, what) in sigma.iter().zip(["position", "orientation"]) {
-                            if *sigma <= 0.0 {
-                                return Err(IdentificationError::NoNoise { what });
-                            }
-                        }
-                        sigma.map(|sigma| 1.0 / sigma)
-                    }
-                };
-                Ok(RowWeights { weight, sigma })
-            })
-            .collect::<Result<_, _>>()?;
-        Ok(Problem { arm, measurements, rows_per_pose: if orientation { 6 } else { 3 }, rows })
+        let equations = Equations::new(sensor, measurements);
+        let of_equation = |(equation, sigma): (usize, &f64)| match weights {
+            Weights::Unit => Ok(1.0),
+            Weights::Noise if *sigma <= 0.0 => {
+                Err(IdentificationError::NoNoise { what: ["position", "orientation"][equations.component(equation) / 3] })
+            }
+            Weights::Noise => Ok(1.0 / sigma),
+        };
+        let weights = equations.sigmas().iter().enumerate().map(of_equation).collect::<Result<_, _>>()?;
+        Ok(Plain { arm, measurements, equations, weights })
     }
 
-    fn equations(&self) -> usize {
-        self.rows_per_pose * self.measurements.len()
+    /// What the measurements tell.
+    pub(super) fn equations(&self) -> &Equations {
+        &self.equations
     }
 
-    fn linearise(&self, values: &[f64]) -> Linearised {
-        let chain = self.arm.chain.at(values);
-        let (n, per_pose) = (chain.parameter_count(), self.rows_per_pose);
-        let mut residuals = DVector::zeros(self.equations());
-        // Built transposed: each pose then fills consecutive memory.
-        let mut transposed = DMatrix::zeros(n, self.equations());
-        let mut rows = vec![0.0; 6 * n];
-        for (index, (measurement, row)) in self.measurements.iter().zip(&self.rows).enumerate() {
-            let (axes, origin) = chain.jacobian_into(&measurement.joints, &mut rows, n);
-            let predicted = crate::arm::frames::pose_from_parts(&axes, &origin);
-            let error = match measurement.orientation() {
-                Some(orientation) => pose_error(&Pose::from_parts(measurement.position().into(), orientation), &predicted),
-                None => {
-                    let difference = measurement.position().coords - origin;
-                    Vector6::new(difference.x, difference.y, difference.z, 0.0, 0.0, 0.0)
-                }
-            };
-            if per_pose == 6 {
-                turn_to_residual(&mut rows[3 * n..], n, &error.fixed_rows::<3>(3).into_owned());
-            }
-            for component in 0..per_pose {
-                let weight = row.weight[component / 3];
-                let at = index * per_pose + component;
-                residuals[at] = weight * error[component];
-                for (entry, value) in transposed.column_mut(at).iter_mut().zip(&rows[component * n..(component + 1) * n]) {
-                    *entry = weight * value;
-                }
-            }
+    /// Whether there are enough equations for `rank` parameters.
+    pub(super) fn enough(&self, rank: usize) -> Result<(), IdentificationError> {
+        let (equations, poses) = (self.equations.len(), self.measurements.len());
+        if equations >= rank {
+            return Ok(());
         }
-        Linearised { residuals, jacobian: transposed.transpose() }
+        Err(IdentificationError::TooFew { poses, equations, rank, needed: (rank * poses).div_ceil(equations.max(1)) })
     }
 
-    /// Sum of squares of the residuals over their declared sigmas, of the components whose noise is declared.
-    fn noise_scale(&self, values: &[f64]) -> NoiseScale {
-        let chain = self.arm.chain.at(values);
+    /// Sum of squares of the residuals of `predict` over their declared sigmas, of the equations whose noise is declared.
+    fn noise_scale(&self, predict: &dyn Fn(&Measurement) -> Pose) -> NoiseScale {
         let mut sum_of_squares = 0.0;
         let mut known = true;
-        for (measurement, row) in self.measurements.iter().zip(&self.rows) {
-            let error = residual(measurement, &chain);
-            for component in 0..self.rows_per_pose {
-                let sigma = row.sigma[component / 3];
+        // Of a position and of an orientation.
+        let mut declared = [0.0, 0.0];
+        for (row, measurement) in self.measurements.iter().enumerate() {
+            let error = difference(measurement, &predict(measurement));
+            for equation in self.equations.of(row) {
+                let (component, sigma) = (self.equations.component(equation), self.equations.sigmas()[equation]);
+                declared[component / 3] += sigma.powi(2);
                 if sigma > 0.0 {
                     sum_of_squares += (error[component] / sigma).powi(2);
                 } else {
@@ -497,77 +510,82 @@ impl<'a> Problem<'a> {
                 }
             }
         }
-        let rms = |part: usize| {
-            let squares: f64 = self.rows.iter().map(|row| 3.0 * row.sigma[part].powi(2)).sum();
-            (squares / self.rows.len().max(1) as f64).sqrt()
-        };
-        let rotation_rad = (self.rows_per_pose == 6).then(|| rms(1));
-        NoiseScale { sum_of_squares, known, position_m: rms(0), rotation_rad }
+        let [position_m, rotation_rad] = declared.map(|squares| (squares / self.measurements.len().max(1) as f64).sqrt());
+        let rotation_rad = self.equations.has_orientation().then_some(rotation_rad);
+        NoiseScale { sum_of_squares, known, position_m, rotation_rad }
     }
 
     /// The weighted Jacobian with rows in units of the declared sigma instead.
     fn in_sigmas(&self, jacobian: &DMatrix<f64>) -> DMatrix<f64> {
         let mut scaled = jacobian.clone();
-        for (index, mut row) in scaled.row_iter_mut().enumerate() {
-            let weights = self.rows[index / self.rows_per_pose];
-            let part = index % self.rows_per_pose / 3;
+        for (equation, mut row) in scaled.row_iter_mut().enumerate() {
             // A reading that is declared exact is taken to a nanometre or nanoradian.
-            row *= 1.0 / (weights.weight[part] * weights.sigma[part].max(1e-9));
+            row *= 1.0 / (self.weights[equation] * self.equations.sigmas()[equation].max(1e-9));
         }
         scaled
     }
 
-    /// Covariance of the independent parameters from the declared noise: `A Jᵀ W Σ W J A` with `A = (Jᵀ J)⁻¹` of the weighted
-    /// Jacobian, which is A itself where the weights are the sigmas.
-    fn covariance(&self, jacobian: &DMatrix<f64>, subspace: &Subspace) -> DMatrix<f64> {
+    /// Covariance of the independent parameters from the declared noise: `A (Jᵀ W Σ W J + P) A` with `A = (Jᵀ J + P)⁻¹` of the weighted
+    /// Jacobian and the prior's precision `P`, which is A itself where the weights are the sigmas; zero for no prior.
+    pub(super) fn covariance(&self, jacobian: &DMatrix<f64>, subspace: &Subspace, prior: Option<&DMatrix<f64>>) -> DMatrix<f64> {
         let j = jacobian.select_columns(&subspace.independent);
         let rank = subspace.rank();
-        let Some(inverse) = scaled_inverse(&gram(&j)) else {
+        let with_prior = |gram: DMatrix<f64>| match prior {
+            Some(precision) => gram + precision,
+            None => gram,
+        };
+        let Some(inverse) = scaled_inverse(&with_prior(gram(&j))) else {
             return DMatrix::from_element(rank, rank, f64::NAN);
         };
         let mut scaled = j.clone();
-        for (index, mut row) in scaled.row_iter_mut().enumerate() {
-            let weights = self.rows[index / self.rows_per_pose];
-            let part = index % self.rows_per_pose / 3;
-            row *= weights.weight[part] * weights.sigma[part];
+        for (equation, mut row) in scaled.row_iter_mut().enumerate() {
+            row *= self.weights[equation] * self.equations.sigmas()[equation];
         }
-        product(&product(&inverse, &gram(&scaled)), &inverse)
+        product(&product(&inverse, &with_prior(gram(&scaled))), &inverse)
     }
 }
 
-/// `matrixᵀ matrix`. Not nalgebra's product, whose kernels (and last bits) depend on the processor.
-fn gram(matrix: &DMatrix<f64>) -> DMatrix<f64> {
-    let columns = matrix.ncols();
-    let mut gram = DMatrix::zeros(columns, columns);
-    for first in 0..columns {
-        for second in 0..=first {
-            let value = matrix.column(first).dot(&matrix.column(second));
-            gram[(first, second)] = value;
-            gram[(second, first)] = value;
+impl Problem for Plain<'_> {
+    type Point = Vec<f64>;
+
+    fn linearise(&self, values: &Vec<f64>) -> Linearised {
+        let chain = self.arm.chain.at(values);
+        let n = chain.parameter_count();
+        let mut residuals = DVector::zeros(self.equations.len());
+        // Built transposed: each pose then fills consecutive memory.
+        let mut transposed = DMatrix::zeros(n, self.equations.len());
+        let mut rows = vec![0.0; 6 * n];
+        for (row, measurement) in self.measurements.iter().enumerate() {
+            let (axes, origin) = chain.jacobian_into(&measurement.joints, &mut rows, n);
+            let error = difference(measurement, &crate::arm::frames::pose_from_parts(&axes, &origin));
+            turn_to_residual(&mut rows[3 * n..], n, &error.fixed_rows::<3>(3).into_owned());
+            for equation in self.equations.of(row) {
+                let (component, weight) = (self.equations.component(equation), self.weights[equation]);
+                residuals[equation] = weight * error[component];
+                for (entry, value) in transposed.column_mut(equation).iter_mut().zip(&rows[component * n..(component + 1) * n]) {
+                    *entry = weight * value;
+                }
+            }
         }
+        Linearised { residuals, jacobian: transposed.transpose(), departures: None }
     }
-    gram
-}
 
-/// `left · right`; see [`gram`].
-fn product(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
-    DMatrix::from_fn(left.nrows(), right.ncols(), |row, column| {
-        left.row(row).iter().zip(right.column(column).iter()).map(|(a, b)| a * b).sum()
-    })
-}
+    fn moved(&self, from: &Vec<f64>, columns: &[usize], step: &DVector<f64>) -> Vec<f64> {
+        let mut to = from.clone();
+        for (column, change) in columns.iter().zip(step.iter()) {
+            to[*column] += change;
+        }
+        to
+    }
 
-/// Inverse of a positive definite matrix whose rows have different units.
-fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let scale = matrix.diagonal().map(|value| 1.0 / value.sqrt());
-    let scaled =
-        DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |row, column| matrix[(row, column)] * scale[row] * scale[column]);
-    let inverse = Cholesky::new(scaled)?.inverse();
-    Some(DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |row, column| inverse[(row, column)] * scale[row] * scale[column]))
+    fn one_sigma(&self) -> f64 {
+        self.weights.first().map_or(0.0, |weight| weight * self.equations.sigmas()[0])
+    }
 }
 
 /// Turns the rotation rows of a Jacobian (change of the predicted orientation) into the change of the rotation residual `error`:
 /// the inverse right Jacobian of the rotation group, exact however large the residual is.
-fn turn_to_residual(rows: &mut [f64], n: usize, error: &Vector3<f64>) {
+pub(super) fn turn_to_residual(rows: &mut [f64], n: usize, error: &Vector3<f64>) {
     let angle = error.norm();
     if angle < 1e-8 {
         return;
@@ -582,110 +600,6 @@ fn turn_to_residual(rows: &mut [f64], n: usize, error: &Vector3<f64>) {
         rows[n + column] = turned.y;
         rows[2 * n + column] = turned.z;
     }
-}
-
-struct Solution {
-    values: Vec<f64>,
-    jacobian: DMatrix<f64>,
-    converged: bool,
-    reason: String,
-    steps: usize,
-}
-
-fn solve(problem: &Problem<'_>, columns: &[usize], start: Vec<f64>, linearised: Linearised) -> Solution {
-    let mut values = start;
-    let mut here = linearised;
-    let mut cost = here.residuals.norm_squared();
-    // Damping and the factor by which it grows after a failure, after Nielsen 1999.
-    let (mut damping, mut growth): (f64, f64) = (0.0, 2.0);
-    let done = |values, here: Linearised, converged, reason: String, steps| Solution {
-        values,
-        jacobian: here.jacobian,
-        converged,
-        reason,
-        steps,
-    };
-    for step_number in 1..=MAX_STEPS {
-        let jacobian = here.jacobian.select_columns(columns);
-        let Some(step) = step(&jacobian, &here.residuals, damping) else {
-            return done(values, here, false, "the equations became singular".to_owned(), step_number);
-        };
-        let change = (&jacobian * &step).norm();
-        let mut trial = values.clone();
-        for (position, &column) in columns.iter().enumerate() {
-            trial[column] += step[position];
-        }
-        let there = problem.linearise(&trial);
-        let trial_cost = there.residuals.norm_squared();
-        let sigma = (cost / problem.equations() as f64).sqrt().max(problem.one_sigma());
-        let settled = change <= STEP_TOLERANCE * sigma;
-        let undamped = damping == 0.0;
-        if trial_cost.is_finite() && (trial_cost <= cost * (1.0 + ROUNDING) || settled) {
-            // Gain over what the linear model, with its damping, promises.
-            let promised = change * change + 2.0 * damping * scaled_square(&jacobian, &step);
-            let gain = if promised > 0.0 { (cost - trial_cost) / promised } else { 1.0 };
-            damping *= (1.0 - (2.0 * gain - 1.0).powi(3)).clamp(0.1, 2.0);
-            growth = 2.0;
-            if damping < 1e-9 || settled {
-                damping = 0.0;
-            }
-            values = trial;
-            here = there;
-            cost = trial_cost;
-            if settled && undamped {
-                let reason = "the last step changed the predictions by less than a millionth of a standard deviation".to_owned();
-                return done(values, here, true, reason, step_number);
-            }
-        } else {
-            damping = if damping == 0.0 { 1e-4 } else { damping * growth };
-            growth *= 2.0;
-            if damping > 1e12 {
-                return done(values, here, false, "no step makes the residuals smaller".to_owned(), step_number);
-            }
-        }
-    }
-    done(values, here, false, format!("not settled after {MAX_STEPS} steps"), MAX_STEPS)
-}
-
-/// Square of the step's length in units in which every column of the Jacobian has length one.
-fn scaled_square(jacobian: &DMatrix<f64>, step: &DVector<f64>) -> f64 {
-    jacobian.column_iter().zip(step.iter()).map(|(column, value)| column.norm_squared() * value * value).sum()
-}
-
-impl Problem<'_> {
-    /// Length of a weighted residual vector in which one component is off by one declared sigma: what counts as nothing.
-    fn one_sigma(&self) -> f64 {
-        self.rows.first().map_or(0.0, |row| row.weight[0] * row.sigma[0])
-    }
-}
-
-/// The step that minimises the linearised residuals, by QR of the column-scaled Jacobian, damped after Levenberg and Marquardt.
-fn step(jacobian: &DMatrix<f64>, residuals: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
-    let (rows, columns) = jacobian.shape();
-    let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
-    let extra = if damping > 0.0 { columns } else { 0 };
-    let mut matrix = DMatrix::zeros(rows + extra, columns);
-    for (column, norm) in norms.iter().enumerate() {
-        if !norm.is_finite() || *norm == 0.0 {
-            return None;
-        }
-        matrix.view_mut((0, column), (rows, 1)).copy_from(&(jacobian.column(column) / *norm));
-        if damping > 0.0 {
-            matrix[(rows + column, column)] = damping.sqrt();
-        }
-    }
-    let mut right = DVector::zeros(rows + extra);
-    right.rows_mut(0, rows).copy_from(residuals);
-    let qr = matrix.qr();
-    qr.q_tr_mul(&mut right);
-    let mut step = right.rows(0, columns).into_owned();
-    if !qr.unpack_r().solve_upper_triangular_mut(&mut step) {
-        return None;
-    }
-    for (value, norm) in step.iter_mut().zip(&norms) {
-        *value /= norm;
-    }
-    step.iter().all(|value| value.is_finite()).then_some(step)
 }
 
 /// The combination behind independent parameter number `position`, in words.

@@ -1,8 +1,11 @@
 //! From measurements to parameters, with what can be known about them.
 
 pub mod alignment;
+pub mod geometry;
 pub mod least_squares;
 pub mod outcome;
+pub mod real;
 
 pub use alignment::align;
 pub use least_squares::{IdentificationError, fit_some, identify, identify_on};
+pub use real::identify_real;

@@ -635,7 +635,7 @@ mod tests {
         let simulator = Simulator::new(&scene.arm, &waterfall, &rows);
         let still = simulator.run(&[]).unwrap();
         let readings = &waterfall.conditions.readings;
-        let orientation = waterfall.rows.per_row == 6;
+        let orientation = waterfall.rows.equations.has_orientation();
         let all = library(&waterfall.rows.mechanism, &waterfall.conditions.columns);
         let known: Vec<&Hypothesis> = all.iter().filter(|hypothesis| hypothesis.kind.is_some()).collect();
         let mut seen = std::collections::BTreeSet::from([Kind::MeasurementOutliers]);

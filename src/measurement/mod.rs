@@ -1,5 +1,6 @@
 //! What a real cell would know of a measured configuration. There is no truth in here.
 
+pub mod equations;
 pub mod table;
 
 use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
@@ -36,6 +37,9 @@ pub struct Measurement {
     pub temperatures_c: Vec<f64>,
     /// Measured origin of the tool frame, m.
     pub position_m: [f64; 3],
+    /// Which of x, y and z were not read; their numbers stand for nothing.
+    #[serde(default, skip_serializing_if = "all_read")]
+    pub unread: [bool; 3],
     /// Measured orientation of the tool frame as quaternion x, y, z, w; absent where the sensor sees positions only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[serde(rename = "attitude_xyzw")]
@@ -58,6 +62,10 @@ pub struct Measurement {
     /// Which reflector on the tool was read, where there are several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<String>,
+}
+
+fn all_read(unread: &[bool; 3]) -> bool {
+    *unread == [false; 3]
 }
 
 impl Measurement {

@@ -1,8 +1,8 @@
 //! Measurement tables (CSV): what a real cell writes down.
 //!
 //! A header names the columns and their units; `#` starts a comment line; columns stand in any order; an unknown column is an error.
-//! `pose_id`, `time_s`, `q1_rad`…`qN_rad` (or `_deg`; `_m`, `_mm` for prismatic joints), `x_m, y_m, z_m` (or `_mm`), optional
-//! `qx, qy, qz, qw`, `role` (`fit`, `held_out`), and the conditions: `approach1`… (-1, 0, 1), `temp_ambient_c`, `temp1_c`…, `payload_kg`,
+//! `pose_id`, `time_s`, `q1_rad`…`qN_rad` (or `_deg`; `_m`, `_mm` for prismatic joints), `x_m, y_m, z_m` (or `_mm`; those that were
+//! read, a cell may be empty), optional `qx, qy, qz, qw`, `role` (`fit`, `held_out`), and the conditions: `approach1`… (-1, 0, 1), `temp_ambient_c`, `temp1_c`…, `payload_kg`,
 //! `dwell_s`, `session`, `target`.
 
 use std::path::Path;
@@ -108,6 +108,7 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
             joints: vec![0.0; layout.joints],
             temperatures_c: vec![0.0; layout.sensors],
             position_m: [0.0; 3],
+            unread: layout.read.map(|read| !read),
             orientation_xyzw: layout.orientation.then_some([0.0; 4]),
             approach: vec![0; layout.approaches],
             ..Measurement::default()
@@ -128,6 +129,7 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
                 }
                 Column::Time => row.time_s = number()?,
                 Column::Joint { joint, factor, .. } => row.joints[*joint] = number()? * factor,
+                Column::Position { axis, .. } if text.is_empty() => row.unread[*axis] = true,
                 Column::Position { axis, factor } => row.position_m[*axis] = number()? * factor,
                 Column::Quaternion { component } => {
                     let value = number()?;
@@ -171,6 +173,9 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
                 Column::Session => row.session = Some(text.to_owned()),
                 Column::Target => row.target = Some(text.to_owned()),
             }
+        }
+        if row.unread == [true; 3] {
+            return Err(wrong(line, "none of x, y, z was read; leave the row out".to_owned()));
         }
         if let Some(quaternion) = &mut row.orientation_xyzw {
             let norm = quaternion.iter().map(|component| component * component).sum::<f64>().sqrt();
@@ -231,7 +236,8 @@ pub fn write(measurements: &[Measurement]) -> Result<String, csv::Error> {
         |present: bool, names: &[&str]| if present { names.iter().map(|name| (*name).to_owned()).collect() } else { Vec::new() };
     let mut header = names(true, &["pose_id", "role", "time_s"]);
     header.extend((1..=joints).map(|joint| format!("q{joint}_rad")));
-    header.extend(names(true, &["x_m", "y_m", "z_m"]));
+    let axes: Vec<usize> = (0..3).filter(|axis| measurements.iter().any(|row| !row.unread[*axis])).collect();
+    header.extend(axes.iter().map(|axis| ["x_m", "y_m", "z_m"][*axis].to_owned()));
     header.extend(names(orientation, &["qx", "qy", "qz", "qw"]));
     header.extend((1..=sensors).map(|sensor| format!("temp{sensor}_c")));
     header.extend((1..=joints).filter(|_| approach).map(|joint| format!("approach{joint}")));
@@ -242,8 +248,9 @@ pub fn write(measurements: &[Measurement]) -> Result<String, csv::Error> {
         let role = if row.role == Role::Fit { "fit" } else { "held_out" };
         let mut fields = vec![row.pose_id.to_string(), role.to_owned(), row.time_s.to_string()];
         let quaternion = row.orientation_xyzw.iter().filter(|_| orientation).flatten();
-        let numbers = row.joints.iter().chain(&row.position_m).chain(quaternion).chain(&row.temperatures_c[..sensors]);
-        fields.extend(numbers.map(f64::to_string));
+        fields.extend(row.joints.iter().map(f64::to_string));
+        fields.extend(axes.iter().map(|axis| if row.unread[*axis] { String::new() } else { row.position_m[*axis].to_string() }));
+        fields.extend(quaternion.chain(&row.temperatures_c[..sensors]).map(f64::to_string));
         fields.extend(row.approach.iter().filter(|_| approach).map(i8::to_string));
         let number = |value: Option<f64>| value.map(|value| value.to_string());
         let values =
@@ -260,6 +267,8 @@ struct Layout {
     sensors: usize,
     approaches: usize,
     orientation: bool,
+    /// Which of x, y, z have a column.
+    read: [bool; 3],
 }
 
 impl Layout {
@@ -279,12 +288,11 @@ impl Layout {
         if joints == 0 {
             return Err("no joint columns; q1_rad, q2_rad, … (or _deg, _m, _mm) are needed".to_owned());
         }
-        let axes = numbered(columns, |column| match column {
-            Column::Position { axis, .. } => Some(*axis),
-            _ => None,
-        });
-        if axes != Ok(3) {
-            return Err("the measured position needs x_m, y_m and z_m (or _mm), each once".to_owned());
+        let columns_of =
+            |axis: usize| columns.iter().filter(|of| matches!(of, Column::Position { axis: its, .. } if *its == axis)).count();
+        let of_axes = [0, 1, 2].map(columns_of);
+        if of_axes == [0; 3] || of_axes.iter().any(|count| *count > 1) {
+            return Err("the measured position needs x_m, y_m, z_m (or _mm), those that were read, each once".to_owned());
         }
         let components = numbered(columns, |column| match column {
             Column::Quaternion { component } => Some(*component),
@@ -311,7 +319,7 @@ impl Layout {
             Ok(count) if count == joints => count,
             _ => return Err(format!("directions of approach need approach1 … approach{joints}: one column per joint, or none")),
         };
-        Ok(Layout { joints, sensors, approaches, orientation })
+        Ok(Layout { joints, sensors, approaches, orientation, read: of_axes.map(|count| count == 1) })
     }
 }
 
@@ -406,6 +414,7 @@ mod tests {
             joints: vec![0.1 + 0.2, -1e-17, 3.0],
             temperatures_c: vec![20.1, 1.0 / 3.0],
             position_m: [1.0 / 3.0, -2.0 / 7.0, 1e-9],
+            unread: [false; 3],
             orientation_xyzw: Some([0.5, -0.5, 0.5, -0.5]),
             approach: vec![-1, 0, 1],
             ambient_c: Some(20.0 + 1.0 / 3.0),
@@ -416,6 +425,17 @@ mod tests {
         };
         let rows = vec![row(0), row(1), row(2)];
         assert_eq!(parse(&write(&rows).unwrap(), "t.csv").unwrap().measurements, rows);
+        // A coordinate that some rows lack is an empty cell, one that all lack no column.
+        let flat = |index: usize, of: &[usize]| Measurement {
+            unread: [0, 1, 2].map(|axis| of.contains(&axis)),
+            position_m: [0, 1, 2].map(|axis| if of.contains(&axis) { 0.0 } else { 1.5 }),
+            ..row(index)
+        };
+        for rows in [vec![flat(0, &[2]), flat(1, &[2])], vec![flat(0, &[2]), flat(1, &[]), flat(2, &[0])]] {
+            let text = write(&rows).unwrap();
+            assert_eq!(text.contains("z_m"), rows.len() == 3);
+            assert_eq!(parse(&text, "t.csv").unwrap().measurements, rows);
+        }
         // What only some rows have is left out.
         let some = vec![Measurement { payload_kg: None, approach: Vec::new(), ..row(0) }, row(1)];
         let back = parse(&write(&some).unwrap(), "t.csv").unwrap();
@@ -428,7 +448,9 @@ mod tests {
             ("q1_rad,x_m,y_m,z_m\n", "line 1: the table has a header but no rows"),
             ("q1,x_m,y_m,z_m\n0,0,0,0\n", "column `q1` has no known unit; write q1_rad, _deg, _m or _mm"),
             ("q1_rad,x_m,y_m,z_in\n0,0,0,0\n", "column `z_in` has no known unit; write z_m or z_mm"),
-            ("q1_rad,x_m,y_m\n0,0,0\n", "needs x_m, y_m and z_m"),
+            ("q1_rad,time_s\n0,0\n", "needs x_m, y_m, z_m (or _mm), those that were read"),
+            ("q1_rad,x_m,x_mm\n0,0,0\n", "needs x_m, y_m, z_m (or _mm), those that were read, each once"),
+            ("q1_rad,x_m,y_m\n0,0,0\n0,,\n", "line 3: none of x, y, z was read"),
             ("q1_rad,q3_rad,x_m,y_m,z_m\n", "q2 is missing or doubled"),
             ("q1_rad,x_m,y_m,z_m,colour\n", "unknown column `colour`; known are pose_id"),
             ("q1_rad,x_m,y_m,z_m,qx\n", "an orientation needs all of qx, qy, qz, qw"),

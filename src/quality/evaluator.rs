@@ -3,12 +3,12 @@
 use nalgebra::{DMatrix, Vector3};
 
 use super::Indexes;
-use super::dense;
 use super::globality::{WorkspaceGrid, dispersion};
 use super::observability::observability;
 use super::subspace::Subspace;
 use crate::arm::Arm;
 use crate::arm::ChainAt;
+use crate::numerics::dense;
 use crate::quality::{EvennessDomain, JacobianScaling};
 
 /// Evaluates sets of configurations of one arm at its nominal parameters.

@@ -1,6 +1,5 @@
 //! How good a set of configurations is: observability (O1–O6), globality (dispersion, evenness), and both together (O_C).
 
-pub mod dense;
 pub mod evaluator;
 pub mod globality;
 pub mod information;

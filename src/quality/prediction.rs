@@ -6,8 +6,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::dense;
 use super::information::{InformationModel, JacobianScratch};
+use crate::numerics::dense;
 
 /// Configurations of the sample at which the G-criterion looks for the worst point.
 const WORST_POINTS: usize = 200;

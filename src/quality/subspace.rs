@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use crate::arm::Arm;
+use crate::measurement::equations::COMPONENTS;
 use crate::seed::stream;
 
 /// Singular values of the column-scaled Jacobian below this share of the largest count as zero. What rounding leaves of a
@@ -108,16 +109,23 @@ impl Subspace {
     /// positions only.
     #[must_use]
     pub fn of_structure(arm: &Arm, orientation: bool) -> Subspace {
+        Subspace::of_components(arm, std::array::from_fn(|component| component < 3 || orientation))
+    }
+
+    /// The same where these components of a pose are measured: x, y, z, then the rotation vector, in base.
+    #[must_use]
+    pub fn of_components(arm: &Arm, measured: [bool; COMPONENTS]) -> Subspace {
         let chain = arm.chain.at_nominal();
         let columns = chain.parameter_count();
-        let rows_per_pose = if orientation { 6 } else { 3 };
+        let components: Vec<usize> = (0..COMPONENTS).filter(|component| measured[*component]).collect();
+        let rows_per_pose = components.len();
         let mut stream = stream(0, "quality/structure");
         let mut stacked = DMatrix::zeros(rows_per_pose * STRUCTURE_SAMPLES.max(columns / 2), columns);
-        let samples = stacked.nrows() / rows_per_pose;
+        let samples = STRUCTURE_SAMPLES.max(columns / 2);
         for sample in 0..samples {
             let joints: Vec<f64> = arm.chain.joints.iter().map(|joint| stream.uniform(joint.lower, joint.upper)).collect();
             let (_, jacobian) = chain.jacobian(&joints);
-            stacked.rows_mut(sample * rows_per_pose, rows_per_pose).copy_from(&jacobian.rows(0, rows_per_pose));
+            stacked.rows_mut(sample * rows_per_pose, rows_per_pose).copy_from(&jacobian.select_rows(&components));
         }
         Subspace::reveal(&stacked, &late(arm), 0.0, usize::MAX)
     }

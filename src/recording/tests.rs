@@ -163,6 +163,7 @@ fn events(size: &Size) -> Vec<Event> {
             joints,
             temperatures_c: if index % 2 == 0 { vec![22.0, 22.5] } else { Vec::new() },
             position_m: (pose.translation.vector.map(|value| value + stream.uniform(-1e-3, 1e-3))).into(),
+            unread: [false, false, index % 4 == 3],
             orientation_xyzw: (index % 3 != 0).then(|| pose.rotation.coords.into()),
             // The last one as earlier versions recorded it.
             approach: if index + 1 < size.measurements { vec![-1, 0, 1] } else { Vec::new() },

@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use kincal::measurement::Measurement;
+use kincal::seed::stream;
 use serde_json::Value;
 
 use crate::harness::kincal;
@@ -141,4 +143,107 @@ fn what_is_named_is_confirmed_by_the_physics() {
         ["diagnose", &path("gap.csv"), "--robot", &path("bare.urdf"), "--position-noise-um", "30", "--confirm", "--json"];
     let json = kincal(folder.path(), &arguments).json();
     agrees(&json, json["gap"]["noise_rms_m"].as_f64().unwrap());
+}
+
+/// A table of an arm of `robot`'s kind that only its geometry has wrong, read with uniform noise (so that no reading is far off and
+/// weighted down) in a frame of its own; `tilt`: share of 1.5 rad by which that may lean.
+fn clean_table(robot: &kincal::arm::Arm, orientation: bool, tilt: f64) -> Vec<Measurement> {
+    let mut stream = stream(7, "test/diagnose/clean");
+    let mut noise = |size: f64| nalgebra::Vector3::from_fn(|_, _| stream.uniform(-size, size));
+    let base = nalgebra::Isometry3::new(noise(2.0), noise(1.5).component_mul(&nalgebra::Vector3::new(tilt, tilt, 1.0)));
+    let target = nalgebra::Isometry3::new(noise(0.1), noise(1.5));
+    let mut values = robot.chain.nominal();
+    for (value, parameter) in values.iter_mut().zip(&robot.chain.parameters) {
+        *value += noise(if parameter.quantity.unit() == "m" { 1e-3 } else { 2e-3 }).x;
+    }
+    let chain = robot.chain.at(&values);
+    (0..80)
+        .map(|index| {
+            let joints: Vec<f64> = robot
+                .chain
+                .joints
+                .iter()
+                .map(|joint| 0.5 * (joint.lower + joint.upper) + 0.5 * (joint.upper - joint.lower) * noise(1.0).x)
+                .collect();
+            let pose = base * chain.forward(&joints) * target;
+            let turn = nalgebra::UnitQuaternion::from_scaled_axis(noise(3f64.sqrt() * 1e-4)) * pose.rotation;
+            Measurement {
+                index,
+                pose_id: index,
+                time_s: index as f64,
+                joints,
+                position_m: (pose.translation.vector + noise(3f64.sqrt() * 2e-5)).into(),
+                orientation_xyzw: orientation.then(|| turn.coords.into()),
+                ..Measurement::default()
+            }
+        })
+        .collect()
+}
+
+/// The same is left of every reading, to a nanometre.
+fn check_same_geometry(identified: &Value, diagnosed: &Value) {
+    let residuals = |json: &Value, key: &str| -> Vec<f64> {
+        let rows = json["residuals"].as_array().unwrap().iter();
+        rows.flat_map(|row| row[key].as_array().unwrap()[..3].iter().map(|value| value.as_f64().unwrap())).collect()
+    };
+    let (one, other) = (residuals(identified, "identified"), residuals(diagnosed, "before_m"));
+    let apart = one.iter().zip(&other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    println!("at most {apart:.1e} m apart; {}", diagnosed["sentence"]);
+    assert!(one.len() == 240 && other.len() == 240 && apart < 1e-9, "{apart:e} m");
+}
+
+/// A camera above sees x and y; or some readings lack z.
+#[test]
+fn x_and_y_alone_are_identified_and_diagnosed() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    let table = out.join("table.csv").to_str().unwrap().to_owned();
+    let arm = kincal::scene::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml")).unwrap().scene.arm;
+    for all in [true, false] {
+        let mut rows = clean_table(&arm, false, 0.05);
+        for row in rows.iter_mut().filter(|row| all || row.index % 3 == 0) {
+            row.unread[2] = true;
+        }
+        let text = kincal::measurement::table::write(&rows).unwrap();
+        assert_eq!(text.lines().next().unwrap().contains("z_m"), !all);
+        fs::write(&table, text).unwrap();
+        let run = |command: &str| {
+            kincal(out, &[command, &table, "--robot", "scenes/arm8.toml", "--position-noise-um", "20", "--json"]).json()
+        };
+        let (identified, diagnosed) = (run("identify"), run("diagnose"));
+        check_same_geometry(&identified, &diagnosed);
+        assert!(identified["converged"] == true, "{}", identified["reason"]);
+        assert_eq!(identified["equations"], if all { 160 } else { 240 - 27 });
+        // Noise of two axes or three is left, and what cannot be known of the base is said.
+        let rms = identified["fitted"]["position_m"]["rms"].as_f64().unwrap();
+        assert!((5e-6..4e-5).contains(&rms), "{rms}");
+        assert_eq!(identified["notes"].to_string().contains("z was never read"), all, "{}", identified["notes"]);
+        assert_eq!(diagnosed["readings"], 80);
+    }
+}
+
+/// Every number that `identify` leaves of a reading is what `diagnose` leaves of it.
+#[test]
+fn the_geometry_is_the_one_that_identify_fits() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    let path = |name: &str| out.join(name).to_str().unwrap().to_owned();
+    let scene = "scenes/arm8.toml".to_owned();
+    kincal(out, &["export", &scene, "--to", "urdf"]).ends(0);
+    let arm = kincal::scene::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(&scene)).unwrap().scene.arm;
+    for orientation in [false, true] {
+        fs::write(path("table.csv"), kincal::measurement::table::write(&clean_table(&arm, orientation, 1.0)).unwrap()).unwrap();
+        for robot in [path("arm8.urdf"), scene.clone()] {
+            let run = |command: &str| {
+                let noise = ["--position-noise-um", "20", "--attitude-noise-deg", "0.00573", "--json"];
+                kincal(out, &[&[command, &path("table.csv"), "--robot", &robot], &noise[..]].concat()).json()
+            };
+            let (identified, diagnosed) = (run("identify"), run("diagnose"));
+            println!("{robot}, orientations {orientation}");
+            check_same_geometry(&identified, &diagnosed);
+            assert!(identified["converged"] == true, "{}", identified["reason"]);
+            let notes = identified["notes"].to_string();
+            assert!(!notes.contains("the calibrated file is off"), "{notes}");
+        }
+    }
 }

@@ -3,12 +3,14 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::arm::Arm;
-use crate::arm::JointKind;
 use crate::arm::frames::Pose;
+use crate::arm::{ChainAt, JointKind};
 
 /// What an arm is made of, as far as signatures need it.
 #[derive(Clone, Debug)]
 pub struct Mechanism {
+    /// From the root to the tool.
+    pub chain: ChainAt,
     /// Transforms between joints ([`crate::arm::ChainAt::segments`]).
     pub segments: Vec<Pose>,
     /// Which joints slide.
@@ -78,13 +80,19 @@ impl Mechanism {
             })
             .collect();
         let slides = arm.chain.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect();
-        Mechanism { segments, slides, centres, masses_known, gravity: arm.gravity_in_base }
+        Mechanism { chain: at, segments, slides, centres, masses_known, gravity: arm.gravity_in_base }
     }
 
     /// Number of joints.
     #[must_use]
     pub fn joint_count(&self) -> usize {
         self.slides.len()
+    }
+
+    /// The same masses on `chain`, from the root to the tool: the fitted arm instead of the nominal one.
+    #[must_use]
+    pub fn with_chain(self, chain: ChainAt) -> Mechanism {
+        Mechanism { segments: chain.segments(), chain, ..self }
     }
 
     /// The arm at the coordinates `joints` (rad or m), with a payload (kg) at the origin of its tool frame.
@@ -100,35 +108,20 @@ impl Mechanism {
         let count = self.joint_count();
         let (mut axes, mut frames, mut origins) = (Vec::new(), Vec::new(), Vec::new());
         let mut centres = Vec::with_capacity(count);
-        let mut rotation = Matrix3::identity();
-        let mut origin = Vector3::zeros();
-        if let Some(motion) = motions.first() {
-            (rotation, origin) = (motion.rotation, motion.translation);
-        }
-        for (joint, segment) in self.segments.iter().enumerate() {
-            origin += rotation * segment.translation.vector;
-            rotation *= segment.rotation.to_rotation_matrix().into_inner();
-            if joint == count {
-                break;
-            }
-            let axis: Vector3<f64> = rotation.column(2).into();
-            axes.push(axis);
-            origins.push(origin);
-            if self.slides[joint] {
-                origin += axis * joints[joint];
-            } else {
-                let (sine, cosine) = libm::sincos(joints[joint]);
-                let (x, y): (Vector3<f64>, Vector3<f64>) = (rotation.column(0).into(), rotation.column(1).into());
-                rotation = Matrix3::from_columns(&[x * cosine + y * sine, y * cosine - x * sine, axis]);
-            }
+        let mut carried = motions.first().copied().unwrap_or(Motion::IDENTITY);
+        let (rotation, origin) = self.chain.visit_joints(joints, |joint, (before, joint_origin), (after, moved_origin)| {
+            axes.push(carried.rotation * before[2]);
+            origins.push(carried.of_point(joint_origin));
             if let Some(motion) = motions.get(joint + 1) {
-                origin = motion.of_point(&origin);
-                rotation = motion.rotation * rotation;
+                carried = motion.after(&carried);
             }
-            frames.push(rotation);
+            let frame = carried.rotation * Matrix3::from_columns(after);
+            frames.push(frame);
+            let moved_origin = carried.of_point(moved_origin);
             let (mass, centre) = &self.centres[joint];
-            centres.push((*mass, origin + rotation * centre.coords));
-        }
+            centres.push((*mass, moved_origin + frame * centre.coords));
+        });
+        let (rotation, origin) = (carried.rotation * rotation, carried.of_point(&origin));
         let (mut forces, mut moments) = (vec![Vector3::zeros(); count], vec![Vector3::zeros(); count]);
         // From the tip inwards: total weight, and its moment about the root's origin.
         let mut force = self.gravity * payload_kg;

@@ -13,7 +13,7 @@ use super::published::Published;
 use crate::design::candidates::{Rules, Sampler};
 use crate::design::objective::Models;
 use crate::figure::{Axis, Colour, Figure, Kind, Marker, Panel, Series};
-use crate::quality::dense;
+use crate::numerics::dense;
 use crate::quality::evaluator::comprehensive;
 use crate::quality::globality::dispersion;
 use crate::quality::observability::observability;

@@ -1,7 +1,11 @@
 //! What makes equations alike in noise: one over sigma of each, and, where joints do not repeat, the inverse root of the covariance that
 //! this gives to the equations of each row; times the root of the row's weight.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector, DVectorView, SymmetricEigen};
+
+use crate::measurement::equations::Equations;
 
 /// Whitens residuals, geometry and signatures alike.
 #[derive(Clone, Debug)]
@@ -12,28 +16,28 @@ pub struct Whitening {
     weights: Vec<f64>,
     /// Of each row instead of the diagonal; empty where no joint scatters.
     blocks: Vec<DMatrix<f64>>,
-    /// Equations per row.
-    per_row: usize,
+    /// First equation of each row, and last how many there are.
+    first: Vec<usize>,
 }
 
 impl Whitening {
-    /// Sensor noise alone. `inverse_sigmas`: one over sigma of each equation; `weights`: of each row.
+    /// Sensor noise alone. `inverse_sigmas`: one over sigma of each of the `equations`; `weights`: of each row.
     #[must_use]
-    pub fn new(mut inverse_sigmas: DVector<f64>, weights: &[f64]) -> Whitening {
-        let per_row = inverse_sigmas.len() / weights.len().max(1);
-        for (equation, value) in inverse_sigmas.iter_mut().enumerate() {
-            *value *= libm::sqrt(weights[equation / per_row]);
+    pub fn new(equations: &Equations, mut inverse_sigmas: DVector<f64>, weights: &[f64]) -> Whitening {
+        let mut first = vec![0];
+        for (row, weight) in weights.iter().enumerate() {
+            inverse_sigmas.rows_range_mut(equations.of(row)).apply(|value| *value *= libm::sqrt(*weight));
+            first.push(equations.of(row).end);
         }
-        Whitening { diagonal: inverse_sigmas, weights: weights.to_vec(), blocks: Vec::new(), per_row }
+        Whitening { diagonal: inverse_sigmas, weights: weights.to_vec(), blocks: Vec::new(), first }
     }
 
     /// With errors beside the sensor's: of each row the displacements (m, rad) that one sigma of each of them makes.
     #[must_use]
     pub fn with(mut self, scattered: &[Vec<DVector<f64>>]) -> Whitening {
-        let per_row = self.per_row;
         let block = |(row, moved): (usize, &Vec<DVector<f64>>)| -> DMatrix<f64> {
-            let own = self.diagonal.rows(row * per_row, per_row).into_owned();
-            let mut covariance = DMatrix::identity(per_row, per_row);
+            let own = self.diagonal.rows_range(self.equations_of(row)).into_owned();
+            let mut covariance = DMatrix::identity(own.len(), own.len());
             for moved in moved {
                 // A weight counts a row as more or less than one; it is no part of what its noise is.
                 let moved = moved.component_mul(&own) / libm::sqrt(self.weights[row].max(1e-300));
@@ -42,18 +46,25 @@ impl Whitening {
             // Symmetric, so that directions stay what they are.
             let eigen = SymmetricEigen::new(covariance);
             let root = eigen.eigenvalues.map(|value| 1.0 / libm::sqrt(value));
-            &eigen.eigenvectors * DMatrix::from_diagonal(&root) * eigen.eigenvectors.transpose() * DMatrix::from_diagonal(&own)
+            let axes = &eigen.eigenvectors;
+            let entry = |i: usize, j: usize| (0..own.len()).map(|k| axes[(i, k)] * root[k] * axes[(j, k)]).sum::<f64>();
+            DMatrix::from_fn(own.len(), own.len(), |i, j| entry(i, j) * own[j])
         };
         self.blocks = scattered.iter().enumerate().map(block).collect();
         self
     }
 
-    /// The first `count` equations of each row, sensor noise alone.
+    /// Sensor noise alone, for the equations number `which` of all, which are `equations`.
     #[must_use]
-    pub fn of_sensor(&self, count: usize) -> Whitening {
-        let first = |at: usize| self.diagonal[at / count * self.per_row + at % count];
-        let diagonal = DVector::from_fn(count * self.weights.len(), |at, _| first(at));
-        Whitening { diagonal, weights: self.weights.clone(), blocks: Vec::new(), per_row: count }
+    pub fn of_sensor(&self, equations: &Equations, which: &[usize]) -> Whitening {
+        let mut first = vec![0];
+        first.extend((0..equations.readings()).map(|row| equations.of(row).end));
+        Whitening { diagonal: self.diagonal.select_rows(which), weights: self.weights.clone(), blocks: Vec::new(), first }
+    }
+
+    /// The equations of `row`.
+    fn equations_of(&self, row: usize) -> Range<usize> {
+        self.first[row]..self.first[row + 1]
     }
 
     /// Weight of each row.
@@ -65,7 +76,7 @@ impl Whitening {
     /// The equations of `rows` of `matrix`, whitened.
     #[must_use]
     pub fn of_rows(&self, matrix: &DMatrix<f64>, rows: &[usize]) -> DMatrix<f64> {
-        let equations: Vec<usize> = rows.iter().flat_map(|row| row * self.per_row..(row + 1) * self.per_row).collect();
+        let equations: Vec<usize> = rows.iter().flat_map(|row| self.equations_of(*row)).collect();
         let mut chosen = matrix.select_rows(&equations);
         if self.blocks.is_empty() {
             for mut column in chosen.column_iter_mut() {
@@ -74,9 +85,15 @@ impl Whitening {
                 }
             }
         } else {
-            for (at, row) in rows.iter().enumerate() {
-                let own = &self.blocks[*row] * chosen.rows(at * self.per_row, self.per_row);
-                chosen.rows_mut(at * self.per_row, self.per_row).copy_from(&own);
+            let mut at = 0;
+            for row in rows {
+                let block = &self.blocks[*row];
+                let count = block.nrows();
+                for mut column in chosen.column_iter_mut() {
+                    let own = block * column.rows(at, count);
+                    column.rows_mut(at, count).copy_from(&own);
+                }
+                at += count;
             }
         }
         chosen
@@ -92,12 +109,8 @@ impl Whitening {
     /// `vector` (all equations), whitened.
     #[must_use]
     pub fn of_vector(&self, vector: &DVector<f64>) -> DVector<f64> {
-        let rows = vector.as_slice().chunks(self.per_row).enumerate();
-        let values: Vec<f64> = rows
-            .flat_map(|(row, values)| {
-                let whitened = self.of_row(row, DVectorView::from_slice(values, values.len()));
-                whitened.iter().copied().collect::<Vec<f64>>()
-            })
+        let values: Vec<f64> = (0..self.weights.len())
+            .flat_map(|row| self.of_row(row, vector.rows_range(self.equations_of(row))).data.as_vec().clone())
             .collect();
         DVector::from_vec(values)
     }
@@ -109,7 +122,7 @@ impl Whitening {
                 let whitened = block * DVectorView::from_slice(values, values.len());
                 values.copy_from_slice(whitened.as_slice());
             }
-            None => values.iter_mut().enumerate().for_each(|(at, value)| *value *= self.diagonal[row * self.per_row + at]),
+            None => values.iter_mut().enumerate().for_each(|(at, value)| *value *= self.diagonal[self.first[row] + at]),
         }
     }
 
@@ -118,7 +131,7 @@ impl Whitening {
     pub fn of_row(&self, row: usize, values: DVectorView<'_, f64>) -> DVector<f64> {
         match self.blocks.get(row) {
             Some(block) => block * values,
-            None => values.component_mul(&self.diagonal.rows(row * self.per_row, self.per_row)),
+            None => values.component_mul(&self.diagonal.rows_range(self.equations_of(row))),
         }
     }
 }
@@ -126,13 +139,25 @@ impl Whitening {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measurement::{Measurement, Sensor};
 
     #[test]
     fn what_is_whitened_has_unit_covariance_over_its_weight() {
         let inverse = DVector::from_vec(vec![2.0, 3.0, 5.0, 1.0, 1.0, 1.0]);
         let moved = DVector::from_vec(vec![0.4, -0.1, 0.3]);
         let square = moved.map(|value| value * value);
-        let whitening = Whitening::new(inverse.clone(), &[0.25, 1.0]).with(&[vec![moved.clone(), square.clone()], vec![]]);
+        let sensor = Sensor {
+            position_in_base: nalgebra::Point3::origin(),
+            position_sigma_m: 1.0,
+            position_sigma_per_m: 0.0,
+            orientation_sigma_rad: None,
+            temperature_sigma_k: None,
+            view: None,
+        };
+        let reading = Measurement::default();
+        let equations = Equations::new(&sensor, &[&reading, &reading]);
+        let whitening =
+            Whitening::new(&equations, inverse.clone(), &[0.25, 1.0]).with(&[vec![moved.clone(), square.clone()], vec![]]);
         let own = DMatrix::from_diagonal(&inverse.rows(0, 3).map(|value| 1.0 / (value * value)));
         let covariance = own + &moved * moved.transpose() + &square * square.transpose();
         let mut all = DMatrix::identity(6, 6);
@@ -144,7 +169,8 @@ mod tests {
         let as_matrix = whitening.of(&DMatrix::from_column_slice(6, 1, vector.as_slice()));
         assert!((whitening.of_vector(&vector) - as_matrix.column(0)).norm() < 1e-12);
         assert!((whitening.of_rows(&all, &[1]) - whitening.of(&all).rows(3, 3)).norm() < 1e-12);
-        let sensor = whitening.of_sensor(2);
+        let flat = Measurement { unread: [false, false, true], ..reading };
+        let sensor = whitening.of_sensor(&Equations::new(&sensor, &[&flat, &flat]), &[0, 1, 3, 4]);
         assert_eq!(sensor.of_vector(&DVector::from_element(4, 1.0)).as_slice(), [1.0, 1.5, 1.0, 1.0]);
     }
 }

@@ -1,0 +1,631 @@
+//! Where an arm stands, where its target sits and how far its frames are off, from readings in a frame that nobody knows: the one fit
+//! that a calibration of a real arm and a diagnosis share.
+//!
+//! Base and target are free, each session may have a base of its own and each target on the tool has its place. Every joint frame but the
+//! first is off by six small errors ([`FrameErrors`]) with Gaussian priors of the size that machining and assembly leave.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::least_squares::{difference, turn_to_residual};
+use crate::arm::chain::FrameErrors;
+use crate::arm::frames::{Pose, pose_from_parts, registration, rotation_from_vector, rotation_vector};
+use crate::arm::{Arm, ChainAt};
+use crate::measurement::equations::{COMPONENTS, Equations};
+use crate::measurement::{Measurement, Sensor};
+use crate::solver::whitening::Whitening;
+use crate::solver::{Linearised, Problem, Stop, solve};
+
+/// One sigma of a joint frame's position, m: machining and assembly are better than this.
+pub const FRAME_SHIFT: f64 = 5e-3;
+/// One sigma of a joint frame's orientation, rad.
+pub const FRAME_TURN: f64 = 10e-3;
+/// Base and target are free: so wide, about where the fit finds them, that it never binds; m and rad.
+pub const FREE: f64 = 50e-3;
+/// Different configurations that a fit needs.
+const CONFIGURATIONS: usize = 6;
+/// Steps that place base and target, and steps of the whole fit.
+const STEPS: [usize; 2] = [30, 60];
+/// Smallest sigma of a reading, m or rad: what is declared exact is taken to a nanometre or nanoradian.
+const SMALLEST_SIGMA: f64 = 1e-9;
+/// Improvement over the noise's mean square, by parameter, from which on sessions have bases of their own (an F value).
+const OWN_BASE: f64 = 6.0;
+/// Readings of a session from which on they alone say where to look for its base.
+const OWN_START: usize = 4;
+
+/// A geometry that cannot be fitted.
+#[derive(Clone, Debug, thiserror::Error, PartialEq)]
+pub enum GeometryError {
+    /// Too few rows.
+    #[error("{found} rows at {different} different configurations; at least {needed} different ones are needed")]
+    TooFew {
+        /// Rows.
+        found: usize,
+        /// Different configurations.
+        different: usize,
+        /// Least.
+        needed: usize,
+    },
+    /// All in one place.
+    #[error(
+        "the measured (or the nominal) positions lie in one point or on one line, so that they cannot tell where the arm stands; \
+         are the joint units right, and is it this robot?"
+    )]
+    Degenerate,
+    /// Rows with another number of joints.
+    #[error("row {row} has {found} joint readings, the robot has {expected} joints")]
+    Joints {
+        /// From 1.
+        row: usize,
+        /// Readings.
+        found: usize,
+        /// Joints.
+        expected: usize,
+    },
+}
+
+/// Readings to be fitted.
+#[derive(Clone, Copy, Debug)]
+pub struct Readings<'a> {
+    /// The sensor.
+    pub sensor: &'a Sensor,
+    /// What was read.
+    pub measurements: &'a [&'a Measurement],
+    /// Weight of each row: 1 for a good one that stands for itself.
+    pub weights: &'a [f64],
+    /// What effects that are already known do to the target: shift (m) and turn (rad) in root, row by row; empty for nothing.
+    pub displacement: &'a [[f64; COMPONENTS]],
+    /// Joints (from 0) whose motion scatters, and one sigma of that, rad or m.
+    pub scatter: &'a [(usize, f64)],
+}
+
+/// A fitted geometry, and what it leaves of the readings.
+#[derive(Clone, Debug)]
+pub struct Geometry {
+    frames: FrameErrors,
+    placed: Placed,
+    /// Names of the sessions that have bases of their own; one for all where they share one.
+    pub sessions: Vec<String>,
+    /// Names of the targets.
+    pub targets: Vec<String>,
+    /// Session of each row.
+    pub session: Vec<usize>,
+    /// Target of each row.
+    pub target: Vec<usize>,
+    /// What the rows tell.
+    pub equations: Equations,
+    /// What makes the equations alike in noise.
+    pub whitening: Whitening,
+    /// Measured minus predicted, m and rad in the measurement frame; of each equation.
+    pub residual: DVector<f64>,
+    /// What one prior sigma of each parameter does to the predictions: bases, frames, targets.
+    pub jacobian: DMatrix<f64>,
+    /// Which parameters are free (base and target).
+    pub free: Vec<bool>,
+    /// Sum of squares of whitened residuals and of the prior's pull.
+    pub cost: f64,
+    /// Why the fit ended.
+    pub stop: Stop,
+    /// Steps that it took.
+    pub steps: usize,
+    /// What is worth knowing about the sessions.
+    pub notes: Vec<String>,
+}
+
+impl Geometry {
+    /// The fitted parameters over the sigmas of their priors; zero where free.
+    #[must_use]
+    pub fn parameters(&self) -> &DVector<f64> {
+        &self.placed.parameters
+    }
+
+    /// Where the root stands, session by session.
+    #[must_use]
+    pub fn measurement_from_root(&self) -> &[Pose] {
+        &self.placed.measurement_from_root
+    }
+
+    /// Where each target sits on the tool.
+    #[must_use]
+    pub fn tool_from_target(&self) -> &[Pose] {
+        &self.placed.tool_from_target
+    }
+
+    /// The fitted arm from its root to its tool.
+    #[must_use]
+    pub fn root_to_tool(&self) -> ChainAt {
+        self.frames.at(&Pose::identity(), &self.placed.errors(), &Pose::identity())
+    }
+
+    /// The pose of its target at which `measurement` should have found it. A session or target that was not fitted counts as the first.
+    #[must_use]
+    pub fn predict(&self, measurement: &Measurement) -> Pose {
+        let number = |known: &[String], name: &Option<String>| {
+            known.iter().position(|known| *known == name.clone().unwrap_or_default()).unwrap_or(0)
+        };
+        let (session, target) = (number(&self.sessions, &measurement.session), number(&self.targets, &measurement.target));
+        let base = &self.placed.measurement_from_root[session];
+        self.frames.at(base, &self.placed.errors(), &self.placed.tool_from_target[target]).forward(&measurement.joints)
+    }
+
+    /// Largest error of a frame along an axis (m) and about one (rad).
+    #[must_use]
+    pub fn largest_errors(&self) -> [f64; 2] {
+        let errors = self.placed.errors();
+        let largest = |turns: bool| {
+            let of = errors.iter().enumerate().filter(|(at, _)| (at % FrameErrors::PER_FRAME >= 3) == turns);
+            of.map(|(_, value)| value.abs()).fold(0.0, f64::max)
+        };
+        [largest(false), largest(true)]
+    }
+}
+
+/// Fits base, target and geometry of `arm` to `readings`. Sessions get bases of their own where that is worth it.
+///
+/// # Errors
+/// If the readings cannot tell.
+pub fn fit(arm: &Arm, readings: Readings<'_>) -> Result<Geometry, GeometryError> {
+    let (names, session) = numbered(readings.measurements, |row| row.session.as_deref());
+    let together = fit_with(arm, readings, &vec![0; session.len()], vec![String::new()])?;
+    if names.len() < 2 {
+        return Ok(together);
+    }
+    let apart = fit_with(arm, readings, &session, names.clone())?;
+    let added = (FrameErrors::PER_FRAME * (names.len() - 1)) as f64;
+    let left = (apart.residual.len() as f64 - apart.jacobian.ncols() as f64).max(1.0);
+    if (together.cost - apart.cost) / added < OWN_BASE * apart.cost / left {
+        let notes = vec![format!("the {} sessions share one base: bases of their own would not fit better", names.len())];
+        return Ok(Geometry { notes, ..together });
+    }
+    let bases = apart.measurement_from_root();
+    let moved: Vec<String> = names[1..]
+        .iter()
+        .zip(&bases[1..])
+        .map(|(name, base)| {
+            let change = bases[0].inverse() * base;
+            let (shift, turn) = (change.translation.vector.norm(), rotation_vector(&change.rotation).norm());
+            format!("`{name}` {:.3} mm and {:.3} mrad", shift * 1e3, turn * 1e3)
+        })
+        .collect();
+    let note = format!(
+        "the sessions have bases of their own; against `{}` the base or the sensor has moved in session {}",
+        names[0],
+        moved.join(", ")
+    );
+    Ok(Geometry { notes: vec![note], ..apart })
+}
+
+/// The names that `of` gives the rows, sorted, and of each row the number of its own.
+fn numbered<'a>(measurements: &[&'a Measurement], of: impl Fn(&'a Measurement) -> Option<&'a str>) -> (Vec<String>, Vec<usize>) {
+    let own: Vec<&str> = measurements.iter().map(|row| of(row).unwrap_or_default()).collect();
+    let mut names = own.clone();
+    names.sort_unstable();
+    names.dedup();
+    let which = own.iter().map(|name| names.binary_search(name).unwrap_or(0)).collect();
+    (names.into_iter().map(str::to_owned).collect(), which)
+}
+
+/// As [`fit`]; `session` of each row, which have these names.
+fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], sessions: Vec<String>) -> Result<Geometry, GeometryError> {
+    let mut problem = Placing::new(arm, readings, session, sessions.len())?;
+    let start = problem.start(arm)?;
+    let free = problem.free.clone();
+    let of_free: Vec<usize> = (0..free.len()).filter(|column| free[*column]).collect();
+    let all: Vec<usize> = (0..free.len()).collect();
+    // Base and target first: what is fitted with them far off would throw the frames about.
+    let placed = solve(&problem, &of_free, start, STEPS[0]).point;
+    problem.whiten(&placed);
+    let mut fit = solve(&problem, &all, placed, STEPS[1]);
+    let mut steps = fit.steps;
+    if !readings.scatter.is_empty() {
+        // What scatter does was that of the nominal arm.
+        problem.whiten(&fit.point);
+        fit = solve(&problem, &all, fit.point, STEPS[1]);
+        steps += fit.steps;
+    }
+    let (residual, jacobian) = problem.raw(&fit.point);
+    Ok(Geometry {
+        cost: fit.linearised.cost(),
+        stop: fit.stop,
+        steps,
+        placed: fit.point,
+        residual,
+        jacobian,
+        free,
+        sessions,
+        session: session.to_vec(),
+        targets: problem.targets,
+        target: problem.target,
+        equations: problem.equations,
+        whitening: problem.whitening,
+        frames: problem.frames,
+        notes: Vec::new(),
+    })
+}
+
+/// All that is fitted.
+#[derive(Clone, Debug)]
+struct Placed {
+    measurement_from_root: Vec<Pose>,
+    tool_from_target: Vec<Pose>,
+    /// Of the frames, over the sigmas of their priors; zero for bases and targets, which are in the poses above.
+    parameters: DVector<f64>,
+    /// Bases, which come before the frames.
+    before: usize,
+    /// Frame errors.
+    count: usize,
+}
+
+impl Placed {
+    /// Errors of the frames, m and rad.
+    fn errors(&self) -> Vec<f64> {
+        let values = self.parameters.rows(self.before, self.count);
+        values.iter().enumerate().map(|(at, value)| value * sigma_of_frame(at)).collect()
+    }
+}
+
+/// Sigma of a frame's error number `at`.
+fn sigma_of_frame(at: usize) -> f64 {
+    if at % FrameErrors::PER_FRAME < 3 { FRAME_SHIFT } else { FRAME_TURN }
+}
+
+/// The problem of placing an arm.
+struct Placing<'a> {
+    frames: FrameErrors,
+    readings: Readings<'a>,
+    session: &'a [usize],
+    targets: Vec<String>,
+    target: Vec<usize>,
+    equations: Equations,
+    whitening: Whitening,
+    bases: usize,
+    /// Columns of a target: its turn shows only where orientations are read.
+    per_target: usize,
+    free: Vec<bool>,
+    /// Of each column's prior, m or rad.
+    sigma: Vec<f64>,
+}
+
+impl<'a> Placing<'a> {
+    fn new(arm: &Arm, readings: Readings<'a>, session: &'a [usize], bases: usize) -> Result<Self, GeometryError> {
+        let measurements = readings.measurements;
+        let expected = arm.joint_count();
+        for (row, measurement) in measurements.iter().enumerate() {
+            let found = measurement.joints.len();
+            if found != expected {
+                return Err(GeometryError::Joints { row: row + 1, found, expected });
+            }
+        }
+        let mut different: Vec<&[f64]> = measurements.iter().map(|row| row.joints.as_slice()).collect();
+        different.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
+        different.dedup();
+        if different.len() < CONFIGURATIONS {
+            let (found, different) = (measurements.len(), different.len());
+            return Err(GeometryError::TooFew { found, different, needed: CONFIGURATIONS });
+        }
+        let frames = FrameErrors::new(&arm.chain);
+        let (targets, target) = numbered(measurements, |row| row.target.as_deref());
+        let equations = Equations::new(readings.sensor, measurements);
+        let per_target = if equations.has_orientation() { 6 } else { 3 };
+        let (before, count) = (FrameErrors::PER_FRAME * bases, FrameErrors::PER_FRAME * frames.frames());
+        let width = before + count + per_target * targets.len();
+        let free: Vec<bool> = (0..width).map(|column| !(before..before + count).contains(&column)).collect();
+        let sigma = (0..width).map(|column| if free[column] { FREE } else { sigma_of_frame(column - before) }).collect();
+        let whitening = Whitening::new(&equations, inverse_sigmas(&equations), readings.weights);
+        Ok(Placing { frames, readings, session, targets, target, equations, whitening, bases, per_target, free, sigma })
+    }
+
+    /// Where base and target are before anything is fitted.
+    fn start(&self, arm: &Arm) -> Result<Placed, GeometryError> {
+        let measurements = self.readings.measurements;
+        let nominal = arm.chain.at_nominal();
+        let poses: Vec<Pose> = measurements.iter().map(|row| nominal.forward(&row.joints)).collect();
+        let register = |rows: &dyn Fn(&usize) -> bool| {
+            let rows: Vec<usize> = (0..measurements.len()).filter(rows).collect();
+            let from: Vec<Vector3<f64>> = rows.iter().map(|row| poses[*row].translation.vector).collect();
+            let to: Vec<Vector3<f64>> = rows.iter().map(|row| measurements[*row].position().coords).collect();
+            if rows.is_empty() { None } else { registration(&from, &to) }
+        };
+        // A coordinate that was not read is taken as zero where there are no others: near enough to begin with.
+        let whole = |row: &usize| measurements[*row].unread == [false; 3];
+        let of_all = register(&whole).or_else(|| register(&|_| true)).ok_or(GeometryError::Degenerate)?;
+        let measurement_from_root: Vec<Pose> = (0..self.bases)
+            .map(|base| {
+                let own = |row: &usize| self.session[*row] == base && whole(row);
+                let enough = self.bases > 1 && (0..measurements.len()).filter(own).count() >= OWN_START;
+                if enough { register(&own).unwrap_or(of_all) } else { of_all }
+            })
+            .collect();
+        let orientation = self.equations.has_orientation();
+        let tool_from_target = (0..self.targets.len())
+            .map(|target| {
+                // The first reading of each target tells its orientation well enough to start from.
+                let row = self.target.iter().position(|known| *known == target).filter(|_| orientation);
+                let turn = row.and_then(|row| {
+                    let tool = measurement_from_root[self.session[row]].rotation * poses[row].rotation;
+                    Some(tool.inverse() * measurements[row].orientation()?)
+                });
+                Pose::from_parts(Vector3::zeros().into(), turn.unwrap_or_default())
+            })
+            .collect();
+        Ok(Placed {
+            measurement_from_root,
+            tool_from_target,
+            parameters: DVector::zeros(self.free.len()),
+            before: FrameErrors::PER_FRAME * self.bases,
+            count: FrameErrors::PER_FRAME * self.frames.frames(),
+        })
+    }
+
+    /// The chain of each pair of session and target, and where its Jacobian's columns belong.
+    fn chains(&self, placed: &Placed) -> Vec<(ChainAt, Vec<Option<usize>>)> {
+        let errors = placed.errors();
+        let mut chains = Vec::with_capacity(self.bases * self.targets.len());
+        for (session, base) in placed.measurement_from_root.iter().enumerate() {
+            for (target, of_target) in placed.tool_from_target.iter().enumerate() {
+                let of_base = (0..FrameErrors::PER_FRAME).map(|at| Some(FrameErrors::PER_FRAME * session + at));
+                let of_frames = (placed.before..placed.before + placed.count).map(Some);
+                let first = placed.before + placed.count + self.per_target * target;
+                let of_this = (0..FrameErrors::PER_FRAME).map(|at| (at < self.per_target).then_some(first + at));
+                chains.push((self.frames.at(base, &errors, of_target), of_base.chain(of_frames).chain(of_this).collect()));
+            }
+        }
+        chains
+    }
+
+    /// Chain of a row in [`Placing::chains`].
+    fn chain_of(&self, row: usize) -> usize {
+        self.session[row] * self.targets.len() + self.target[row]
+    }
+
+    /// Residuals (measured minus predicted, m and rad) and what one sigma of each parameter does to the predictions.
+    fn raw(&self, placed: &Placed) -> (DVector<f64>, DMatrix<f64>) {
+        let chains = self.chains(placed);
+        let mut residual = DVector::zeros(self.equations.len());
+        let mut jacobian = DMatrix::zeros(self.equations.len(), self.free.len());
+        let columns = FrameErrors::PER_FRAME * (self.frames.frames() + 2);
+        let mut buffer = vec![0.0; COMPONENTS * columns];
+        for (row, measurement) in self.readings.measurements.iter().enumerate() {
+            let (chain, place) = &chains[self.chain_of(row)];
+            let (axes, origin) = chain.jacobian_into(&measurement.joints, &mut buffer, columns);
+            let mut predicted = pose_from_parts(&axes, &origin);
+            if let Some([x, y, z, rx, ry, rz]) = self.readings.displacement.get(row) {
+                let turn = placed.measurement_from_root[self.session[row]].rotation;
+                predicted.translation.vector += turn * Vector3::new(*x, *y, *z);
+                predicted.rotation = rotation_from_vector(&(turn * Vector3::new(*rx, *ry, *rz))) * predicted.rotation;
+            }
+            let error = difference(measurement, &predicted);
+            turn_to_residual(&mut buffer[3 * columns..], columns, &error.fixed_rows::<3>(3).into_owned());
+            for equation in self.equations.of(row) {
+                let component = self.equations.component(equation);
+                residual[equation] = error[component];
+                for (value, place) in buffer[component * columns..(component + 1) * columns].iter().zip(place) {
+                    if let Some(column) = place {
+                        jacobian[(equation, *column)] = value * self.sigma[*column];
+                    }
+                }
+            }
+        }
+        (residual, jacobian)
+    }
+
+    /// Whitens with what scatter does about `placed`.
+    fn whiten(&mut self, placed: &Placed) {
+        let whitening = Whitening::new(&self.equations, inverse_sigmas(&self.equations), self.readings.weights);
+        if self.readings.scatter.is_empty() {
+            self.whitening = whitening;
+            return;
+        }
+        let chains = self.chains(placed);
+        let of_row = |(row, measurement): (usize, &&Measurement)| -> Vec<DVector<f64>> {
+            let motion = chains[self.chain_of(row)].0.joint_jacobian(&measurement.joints);
+            let moved = |(joint, sigma): &(usize, f64)| {
+                let picked: Vec<f64> = self.equations.pick(row, motion[*joint].into()).map(|value| value * sigma).collect();
+                DVector::from_vec(picked)
+            };
+            self.readings.scatter.iter().map(moved).collect()
+        };
+        let scattered: Vec<Vec<DVector<f64>>> = self.readings.measurements.iter().enumerate().map(of_row).collect();
+        self.whitening = whitening.with(&scattered);
+    }
+}
+
+/// One over the sigma of each equation.
+fn inverse_sigmas(equations: &Equations) -> DVector<f64> {
+    DVector::from_iterator(equations.len(), equations.sigmas().iter().map(|sigma| 1.0 / sigma.max(SMALLEST_SIGMA)))
+}
+
+impl Problem for Placing<'_> {
+    type Point = Placed;
+
+    fn linearise(&self, at: &Placed) -> Linearised {
+        let (residual, jacobian) = self.raw(at);
+        Linearised {
+            residuals: self.whitening.of_vector(&residual),
+            jacobian: self.whitening.of(&jacobian),
+            departures: Some(at.parameters.clone()),
+        }
+    }
+
+    fn moved(&self, from: &Placed, columns: &[usize], step: &DVector<f64>) -> Placed {
+        let mut change = DVector::zeros(self.free.len());
+        for (column, value) in columns.iter().zip(step.iter()) {
+            change[*column] = *value;
+        }
+        let mut to = from.clone();
+        let after = from.before + from.count;
+        let pose = |first: usize, count: usize| {
+            let mut errors = [0.0; FrameErrors::PER_FRAME];
+            (0..count).for_each(|at| errors[at] = change[first + at] * self.sigma[first + at]);
+            FrameErrors::pose(&errors)
+        };
+        for (session, base) in to.measurement_from_root.iter_mut().enumerate() {
+            *base *= pose(FrameErrors::PER_FRAME * session, FrameErrors::PER_FRAME);
+        }
+        for (target, place) in to.tool_from_target.iter_mut().enumerate() {
+            *place *= pose(after + self.per_target * target, self.per_target);
+        }
+        for column in from.before..after {
+            to.parameters[column] += change[column];
+        }
+        to
+    }
+
+    fn one_sigma(&self) -> f64 {
+        1.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::arm::mdh;
+    use crate::arm::{Joint, JointKind};
+    use crate::seed::{Stream, stream};
+
+    /// An arm of `count` joints whose frames are drawn; some joints slide.
+    fn arm(count: usize, stream: &mut Stream) -> Arm {
+        let mut frame = || mdh::Frame {
+            alpha: stream.uniform(-2.0, 2.0),
+            a: stream.uniform(-0.4, 0.4),
+            theta: stream.uniform(-2.0, 2.0),
+            d: stream.uniform(-0.4, 0.4),
+            beta: 0.0,
+        };
+        let frames: Vec<mdh::Frame> = (0..=count).map(|_| frame()).collect();
+        let joint = |number: usize| {
+            let kind = if number % 4 == 2 { JointKind::Prismatic } else { JointKind::Revolute };
+            Joint { name: format!("j{number}"), kind, lower: -1.5, upper: 1.5 }
+        };
+        Arm {
+            name: "drawn".to_owned(),
+            chain: mdh::chain(&frames, (0..count).map(joint).collect(), None, None),
+            links: Vec::new(),
+            fixtures: Vec::new(),
+            uncollidable: Vec::new(),
+            gravity_in_base: Vector3::new(0.0, 0.0, -9.81),
+        }
+    }
+
+    fn sensor(orientation: bool) -> Sensor {
+        Sensor {
+            position_in_base: nalgebra::Point3::origin(),
+            position_sigma_m: 2e-5,
+            position_sigma_per_m: 0.0,
+            orientation_sigma_rad: orientation.then_some(5e-5),
+            temperature_sigma_k: None,
+            view: None,
+        }
+    }
+
+    /// Readings of `arm` with frame errors of `wrong` prior sigmas, in sessions of which each has its base.
+    fn readings(arm: &Arm, count: usize, sessions: usize, wrong: f64, noise: f64, stream: &mut Stream) -> Vec<Measurement> {
+        let frames = FrameErrors::new(&arm.chain);
+        let mut six = |size: f64| -> Vec<f64> { (0..6).map(|_| stream.uniform(-size, size)).collect() };
+        let bases: Vec<Pose> = (0..sessions).map(|_| FrameErrors::pose(&six(2.0))).collect();
+        let target = FrameErrors::pose(&six(0.1));
+        let errors: Vec<f64> = (0..6 * frames.frames()).map(|at| wrong * sigma_of_frame(at) * stream.normal()).collect();
+        (0..count)
+            .map(|index| {
+                let joints: Vec<f64> = arm.chain.joints.iter().map(|of| stream.uniform(of.lower, of.upper)).collect();
+                let pose = frames.at(&bases[index % sessions], &errors, &target).forward(&joints);
+                let position = pose.translation.vector + Vector3::from_fn(|_, _| noise * stream.normal());
+                let turn = rotation_from_vector(&Vector3::from_fn(|_, _| noise * stream.normal()));
+                Measurement {
+                    index,
+                    pose_id: index,
+                    joints,
+                    position_m: position.into(),
+                    orientation_xyzw: Some((turn * pose.rotation).coords.into()),
+                    session: Some(format!("s{}", index % sessions)),
+                    ..Measurement::default()
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn readings_of_an_arm_with_wrong_frames_are_predicted_at_poses_that_were_not_used() {
+        let mut stream = stream(1, "test/geometry");
+        for (sessions, orientation) in [(1, true), (1, false), (2, false)] {
+            let arm = arm(6, &mut stream);
+            let rows = readings(&arm, 160, sessions, 0.3, 1e-9, &mut stream);
+            let (fitted, others): (Vec<&Measurement>, Vec<&Measurement>) = rows.iter().partition(|row| row.index < 120);
+            let weights = vec![1.0; fitted.len()];
+            let of = Readings {
+                sensor: &sensor(orientation),
+                measurements: &fitted,
+                weights: &weights,
+                displacement: &[],
+                scatter: &[],
+            };
+            let found = fit(&arm, of).unwrap();
+            assert_eq!((found.stop, found.sessions.len()), (Stop::Converged, sessions));
+            let worst =
+                others.iter().map(|row| difference(row, &found.predict(row)).fixed_rows::<3>(0).norm()).fold(0.0, f64::max);
+            // What the prior pulls is far below the noise that is declared.
+            assert!(worst < 2e-6, "{worst}");
+        }
+    }
+
+    #[test]
+    fn known_effects_are_taken_out_in_root() {
+        let mut stream = stream(2, "test/geometry");
+        let arm = arm(5, &mut stream);
+        let mut rows = readings(&arm, 60, 1, 0.1, 0.0, &mut stream);
+        let (unmoved, weights, sensor) = (rows.clone(), vec![1.0; rows.len()], sensor(true));
+        let read: Vec<&Measurement> = unmoved.iter().collect();
+        let whole = Readings { sensor: &sensor, measurements: &read, weights: &weights, displacement: &[], scatter: &[] };
+        let before = fit(&arm, whole).unwrap();
+        let turn = before.measurement_from_root()[0].rotation;
+        let displacement: Vec<[f64; 6]> = (0..60).map(|_| std::array::from_fn(|_| stream.uniform(-1e-3, 1e-3))).collect();
+        for (row, [x, y, z, rx, ry, rz]) in rows.iter_mut().zip(&displacement) {
+            row.position_m = (Vector3::from(row.position_m) + turn * Vector3::new(*x, *y, *z)).into();
+            let orientation = rotation_from_vector(&(turn * Vector3::new(*rx, *ry, *rz))) * row.orientation().unwrap();
+            row.orientation_xyzw = Some(orientation.coords.into());
+        }
+        let read: Vec<&Measurement> = rows.iter().collect();
+        let after = fit(&arm, Readings { measurements: &read, displacement: &displacement, ..whole }).unwrap();
+        assert!((after.residual - before.residual).amax() < 1e-8);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        /// Whatever the arm, the readings (sound or not), what was read of them, the weights and the start.
+        #[test]
+        fn no_step_of_a_geometry_raises_the_cost(
+            seed in 0u64..1_000_000, joints in 2usize..8, count in 8usize..24, wrong in 0.0..20.0f64, noise in 0.0..0.3f64,
+            orientation: bool, sessions in 1usize..3, away in 0.0..1.5f64,
+        ) {
+            let mut stream = stream(seed, "test/geometry/descent");
+            let arm = arm(joints, &mut stream);
+            let mut rows = readings(&arm, count, sessions, wrong, noise, &mut stream);
+            for row in &mut rows {
+                row.unread[2] = stream.unit() < 0.3;
+            }
+            let read: Vec<&Measurement> = rows.iter().collect();
+            let weights: Vec<f64> = (0..count).map(|_| stream.unit()).collect();
+            let session: Vec<usize> = (0..count).map(|row| row % sessions).collect();
+            let of = Readings {
+                sensor: &sensor(orientation),
+                measurements: &read,
+                weights: &weights,
+                displacement: &[],
+                scatter: &[],
+            };
+            let problem = Placing::new(&arm, of, &session, sessions).unwrap();
+            let all: Vec<usize> = (0..problem.free.len()).collect();
+            let start = problem.start(&arm).unwrap();
+            let step = DVector::from_fn(all.len(), |_, _| away * stream.normal());
+            let start = problem.moved(&start, &all, &step);
+            let mut before = problem.linearise(&start).cost();
+            for most in 1..16 {
+                let cost = solve(&problem, &all, start.clone(), most).linearised.cost();
+                prop_assert!(cost <= before * (1.0 + 1e-11), "{before} became {cost} in step {most}");
+                before = cost;
+            }
+        }
+    }
+}
