@@ -249,8 +249,12 @@ const NO_DIAGNOSIS: &str = "no diagnosis: ";
 /// # Errors
 /// If the measurements do not suffice.
 pub fn diagnose(scene: &Scene, measurements: &[Measurement]) -> Result<Diagnosis, DiagnosisError> {
+    diagnose_with(scene, measurements, &scene.diagnosis)
+}
+
+fn diagnose_with(scene: &Scene, measurements: &[Measurement], settings: &Settings) -> Result<Diagnosis, DiagnosisError> {
     let rows: Vec<&Measurement> = measurements.iter().collect();
-    let options = Options::new(NoiseSource::Declared);
+    let options = Options { settings: settings.clone(), ..Options::new(NoiseSource::Declared) };
     let mut diagnosis = diagnosis::diagnose(&scene.arm, &scene.sensor, &rows, &options)?;
     diagnosis.notes.extend(scene.urdf_notes.iter().cloned());
     Ok(diagnosis)
@@ -265,7 +269,13 @@ pub fn diagnose_and_tell(
     measurements: &[Measurement],
     listener: &mut dyn Listener,
 ) -> Result<Result<Diagnosis, DiagnosisError>, Stopped> {
-    let diagnosis = diagnose(scene, measurements);
+    tell_diagnosis(diagnose(scene, measurements), listener)
+}
+
+fn tell_diagnosis(
+    diagnosis: Result<Diagnosis, DiagnosisError>,
+    listener: &mut dyn Listener,
+) -> Result<Result<Diagnosis, DiagnosisError>, Stopped> {
     listener.report(&match &diagnosis {
         Ok(diagnosis) => Event::Diagnosed(Box::new(diagnosis.clone())),
         Err(error) => Event::Note(format!("{NO_DIAGNOSIS}{error}")),

@@ -314,6 +314,9 @@ pub(crate) struct DiagnoseOptions {
     /// Simulate the effects that are named on the same poses, and compare what they do and what is left
     #[arg(long)]
     pub(crate) confirm: bool,
+    /// Change a number that decides, such as diagnosis.decision.named=0.7; may be given again
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
     /// Use a recording that was cut off, up to the cut
     #[arg(long)]
     pub(crate) partial: bool,

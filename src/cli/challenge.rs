@@ -46,7 +46,8 @@ fn diagnosed_among(case: &folder::Case, only: Option<Vec<(Kind, Location)>>) -> 
     let scene = crate::scene::parse(&case.start.scene, &case.name).map_err(|error| error.to_string())?.scene;
     let rows: Vec<_> = case.measurements.iter().collect();
     let without = case.withheld.iter().filter_map(|name| Kind::from_name(name)).collect();
-    let options = crate::diagnosis::Options { noise: crate::diagnosis::outcome::NoiseSource::Declared, without, only };
+    let usual = crate::diagnosis::Options::new(crate::diagnosis::outcome::NoiseSource::Declared);
+    let options = crate::diagnosis::Options { without, only, settings: scene.diagnosis.clone(), ..usual };
     let found = crate::diagnosis::diagnose(&scene.arm, &scene.sensor, &rows, &options).map_err(|error| error.to_string())?;
     serde_json::to_value(&found).map_err(|error| error.to_string())
 }

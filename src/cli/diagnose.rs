@@ -8,6 +8,7 @@ use super::output::Audience;
 use super::{input, output};
 use crate::arm::Arm;
 use crate::diagnosis::outcome::{Diagnosis, NoiseSource, Verdict};
+use crate::diagnosis::settings::Settings;
 use crate::diagnosis::{self, Options};
 use crate::effects::Kind;
 use crate::event::{Event, Start};
@@ -27,7 +28,8 @@ pub(crate) fn command(global: &Global, options: &DiagnoseOptions) -> anyhow::Res
     }
     let subject = subject(global, options)?;
     let rows: Vec<&Measurement> = subject.measurements.iter().collect();
-    let options_of_diagnosis = Options { noise: subject.noise, without, only: None };
+    let settings = settings(&subject.settings, &options.set)?;
+    let options_of_diagnosis = Options { without, settings, ..Options::new(subject.noise) };
     let mut diagnosis = diagnosis::diagnose(&subject.arm, &subject.sensor, &rows, &options_of_diagnosis)
         .with_context(|| options.input.display().to_string())?;
     diagnosis.notes.extend(subject.notes.iter().cloned());
@@ -72,6 +74,18 @@ fn show(global: &Global, options: &DiagnoseOptions, subject: &Subject, diagnosis
     Ok(())
 }
 
+/// The settings of what is diagnosed with the changes of the command line.
+fn settings(usual: &Settings, changes: &[String]) -> anyhow::Result<Settings> {
+    let mut settings = usual.clone();
+    for change in changes {
+        let (key, value) = change
+            .split_once('=')
+            .with_context(|| format!("--set {change}: KEY=VALUE is needed, such as diagnosis.decision.named=0.7"))?;
+        settings = settings.with(key.trim(), value.trim()).map_err(|wrong| anyhow::anyhow!("--set {change}: {wrong}"))?;
+    }
+    Ok(settings)
+}
+
 /// What is diagnosed.
 struct Subject {
     /// What a recording of it would begin with.
@@ -79,6 +93,7 @@ struct Subject {
     arm: Arm,
     sensor: Sensor,
     noise: NoiseSource,
+    settings: Settings,
     measurements: Vec<Measurement>,
     notes: Vec<String>,
 }
@@ -92,12 +107,28 @@ fn subject(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Subject
             Some(real) => {
                 let (arm, notes) = session::real_robot(&start, real).with_context(|| options.input.display().to_string())?;
                 let sensor = session::real_sensor(real, &measurements);
-                Ok(Subject { start, arm, sensor, noise: NoiseSource::Declared, measurements, notes })
+                Ok(Subject {
+                    start,
+                    arm,
+                    sensor,
+                    noise: NoiseSource::Declared,
+                    settings: Settings::default(),
+                    measurements,
+                    notes,
+                })
             }
             None => {
                 let scene = scene::parse(&start.scene, &format!("{} (scene)", options.input.display()))?.scene;
                 let noise = NoiseSource::Declared;
-                Ok(Subject { start, arm: scene.arm, sensor: scene.sensor, noise, measurements, notes: scene.urdf_notes })
+                Ok(Subject {
+                    start,
+                    arm: scene.arm,
+                    sensor: scene.sensor,
+                    noise,
+                    settings: scene.diagnosis,
+                    measurements,
+                    notes: scene.urdf_notes,
+                })
             }
         };
     }
@@ -109,5 +140,5 @@ fn subject(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Subject
     input::check_joints(&options.input, &table.measurements, arm.joint_count())?;
     let noise = if options.robot.position_noise_um.is_some() { NoiseSource::Declared } else { NoiseSource::Assumed };
     let sensor = session::real_sensor(&real, &table.measurements);
-    Ok(Subject { start, arm, sensor, noise, measurements: table.measurements, notes })
+    Ok(Subject { start, arm, sensor, noise, settings: Settings::default(), measurements: table.measurements, notes })
 }

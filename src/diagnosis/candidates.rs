@@ -3,16 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::evidence::Candidates;
+use super::settings::Prior;
 use crate::effects::Kind;
 use crate::effects::signature::library::Hypothesis;
 use crate::effects::signature::shape::Family;
-
-/// Prior odds of one effect more.
-const ODDS: f64 = 1.0;
-/// Share of the prior of shapes without a name.
-const NAMELESS: f64 = 0.25;
-/// λ at the upper end of the realistic range below which a hypothesis has no information in the data.
-const NO_INFORMATION: f64 = 4.0;
 
 /// The hypotheses with places for their columns; magnitudes are in units of the middle of what is realistic.
 pub(super) fn candidates(hypotheses: Vec<Hypothesis>) -> Candidates {
@@ -39,12 +33,12 @@ fn class(hypothesis: &Hypothesis) -> Class {
 
 /// Which hypotheses have information (`information`: of each, the trace of what survives of it), and their prior odds: equal for all kinds, for all places of a kind, for all variants at a
 /// place; shapes without a name share a part.
-pub(super) fn weigh(candidates: &mut Candidates, information: &[f64]) {
+pub(super) fn weigh(candidates: &mut Candidates, information: &[f64], prior: &Prior) {
     let count = candidates.hypotheses.len();
     for number in 0..count {
         let information = information[number];
         let largest = candidates.hypotheses[number].range[1] / candidates.unit[number];
-        candidates.active[number] = information * largest * largest >= NO_INFORMATION;
+        candidates.active[number] = information * largest * largest >= prior.no_information;
     }
     let active: Vec<usize> = (0..count).filter(|number| candidates.active[*number]).collect();
     let hypotheses = &candidates.hypotheses;
@@ -62,19 +56,19 @@ pub(super) fn weigh(candidates: &mut Candidates, information: &[f64]) {
         let of_class = &places[&class];
         let variants = of_class[&hypotheses[*number].location.index] as f64;
         let named = class.0.is_some();
-        let share = if named { 1.0 - NAMELESS } else { NAMELESS };
+        let share = if named { 1.0 - prior.unnamed } else { prior.unnamed };
         let count = classes[usize::from(named)].len() as f64;
         let own = hypotheses[*number].share.unwrap_or(1.0 / variants);
         // A scan went over all joints, whatever it found.
         let of_class = if hypotheses[*number].share.is_some() && !named { joints } else { of_class.len() };
-        log_odds[*number] = libm::log(ODDS * share * own / (count * of_class as f64));
+        log_odds[*number] = libm::log(prior.odds * share * own / (count * of_class as f64));
     }
     candidates.log_odds = log_odds;
 }
 
 /// Logarithm of the prior odds that one of `joints` joints does what no hypothesis of `candidates` says: a class more of shapes without a name.
-pub(super) fn odds_of_one_more_nameless(candidates: &Candidates, joints: usize) -> f64 {
+pub(super) fn odds_of_one_more_unnamed(candidates: &Candidates, joints: usize, prior: &Prior) -> f64 {
     let nameless = candidates.hypotheses.iter().zip(&candidates.active).filter(|(of, active)| **active && of.kind.is_none());
     let classes: BTreeSet<Class> = nameless.map(|(of, _)| class(of)).collect();
-    libm::log(ODDS * NAMELESS / ((classes.len() + 1) * joints) as f64)
+    libm::log(prior.odds * prior.unnamed / ((classes.len() + 1) * joints) as f64)
 }

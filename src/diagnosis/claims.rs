@@ -6,11 +6,6 @@ use super::search::Claim;
 use crate::effects::Kind;
 use crate::effects::signature::shape::Shape;
 
-/// From this probability on something is named.
-pub(super) const NAMED: f64 = 0.5;
-/// From this probability on nothing else needs to be considered.
-pub(super) const SURE: f64 = 0.95;
-
 /// What hypothesis number `hypothesis` claims.
 pub(super) fn claim(analysis: &Analysis<'_>, hypothesis: usize) -> Claim {
     let hypothesis = &analysis.evidence.candidates.hypotheses[hypothesis];

@@ -5,15 +5,10 @@ use rayon::prelude::*;
 
 use super::deflection::{Deflected, Loads, Present, deflected};
 use super::rows::Rows;
+use super::settings::Model;
 use crate::effects::signature::library::Columns;
 use crate::effects::signature::shape::{Displacement, FORGETTING_S, MEMORIES, Reading};
 use crate::measurement::Measurement;
-
-/// A joint is upright where its torque never exceeds so many sigmas of what is not known of it: its axis leans by less than a degree, and
-/// which way its foot leans decides on which side its play is seated.
-const UPRIGHT: f64 = 6.0;
-/// Change points tried at most.
-const CHANGES: usize = 80;
 
 /// Rows as signatures see them, and what the data have.
 #[derive(Clone, Debug)]
@@ -36,6 +31,7 @@ pub(crate) fn conditions(
     rows: &Rows,
     present: &[Present],
     loads: Loads,
+    settings: &Model,
 ) -> (Conditions, Vec<Displacement>) {
     let mut notes = Vec::new();
     let count = rows.mechanism.joint_count();
@@ -136,12 +132,13 @@ pub(crate) fn conditions(
             values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
         })
         .collect();
-    let unknown =
-        |reading: &Reading, joint: usize| reading.posture.torque(joint).abs() < UPRIGHT * reading.posture.moment_sigma(joint);
+    let unknown = |reading: &Reading, joint: usize| {
+        reading.posture.torque(joint).abs() < settings.upright * reading.posture.moment_sigma(joint)
+    };
     let upright = (0..count).map(|joint| readings.iter().all(|reading| unknown(reading, joint))).collect();
     let margin = (total / 10).max(3);
     let span = total.saturating_sub(2 * margin);
-    let stride = span.div_ceil(CHANGES).max(1);
+    let stride = span.div_ceil(settings.change_points.max(1)).max(1);
     let changes = (margin..total.saturating_sub(margin)).step_by(stride).collect();
     let columns = Columns {
         approach,

@@ -1,18 +1,16 @@
 //! What the data cannot tell apart.
 
 use super::Analysis;
-use super::claims::{NAMED, SURE, place};
+use super::claims::place;
 use super::outcome::Candidate;
-
-/// A hypothesis of a set has at least this probability.
-const WORTH_SAYING: f64 = 0.03;
 
 /// Of each cause that is not sure, what may be in its place.
 pub(super) fn confusion(analysis: &Analysis<'_>) -> Vec<Vec<Candidate>> {
-    let unsure = analysis.found.causes.iter().filter(|beliefs| beliefs[0].probability < SURE);
+    let decision = &analysis.options.settings.decision;
+    let unsure = analysis.found.causes.iter().filter(|beliefs| beliefs[0].probability < decision.sure);
     unsure
         .map(|beliefs| {
-            let worth = beliefs.iter().filter(|belief| belief.probability >= WORTH_SAYING);
+            let worth = beliefs.iter().filter(|belief| belief.probability >= decision.worth_saying);
             worth
                 .map(|belief| Candidate {
                     kind: belief.claim.0,
@@ -22,6 +20,6 @@ pub(super) fn confusion(analysis: &Analysis<'_>) -> Vec<Vec<Candidate>> {
                 })
                 .collect::<Vec<_>>()
         })
-        .filter(|set| set.len() > 1 && set.iter().map(|candidate| candidate.probability).sum::<f64>() >= NAMED)
+        .filter(|set| set.len() > 1 && set.iter().map(|candidate| candidate.probability).sum::<f64>() >= decision.named)
         .collect()
 }

@@ -6,10 +6,9 @@ use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use super::evidence::Candidates;
 use super::rows::Rows;
 use crate::arm::frames::rotation_vector;
-use crate::effects::Level;
-use crate::effects::signature::library::Hypothesis;
 use crate::effects::signature::posture::{Motion, Posture};
-use crate::effects::signature::shape::{Displacement, Reading};
+use crate::effects::signature::shape::{Displacement, Reading, Shape};
+use crate::effects::{Level, Location};
 
 /// Rounds of loads and motions.
 const ROUNDS: usize = 30;
@@ -35,11 +34,12 @@ impl Loads {
     }
 }
 
-/// A hypothesis with the coefficients of its columns, SI.
+/// Something that is there: where, what it follows, and the coefficients of its columns, SI.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Present {
-    hypothesis: Hypothesis,
-    coefficients: Vec<f64>,
+    pub(super) location: Location,
+    pub(super) shape: Shape,
+    pub(super) coefficients: Vec<f64>,
 }
 
 /// What is there according to `coefficients` (column and value).
@@ -51,17 +51,18 @@ pub(super) fn present(candidates: &Candidates, coefficients: &[(usize, f64)]) ->
             known * candidates.unit[number] * candidates.hypotheses[number].spread[at]
         };
         let coefficients: Vec<f64> = columns.enumerate().map(value).collect();
-        coefficients
-            .iter()
-            .any(|value| *value != 0.0)
-            .then(|| Present { hypothesis: candidates.hypotheses[number].clone(), coefficients })
+        coefficients.iter().any(|value| *value != 0.0).then(|| Present {
+            location: candidates.hypotheses[number].location,
+            shape: candidates.hypotheses[number].shape,
+            coefficients,
+        })
     };
     (0..candidates.hypotheses.len()).filter_map(of).collect()
 }
 
 /// Where a motion acts: on everything, outboard of a joint, or on the target alone.
-fn place(hypothesis: &Hypothesis, joints: usize) -> Option<usize> {
-    match (hypothesis.location.level, hypothesis.location.index) {
+fn place(location: &Location, joints: usize) -> Option<usize> {
+    match (location.level, location.index) {
         (Level::Joint | Level::Link, Some(index)) => Some(index.min(joints)),
         (Level::Base, _) => Some(0),
         (Level::Joint | Level::Link | Level::Tool | Level::Sensor, _) => None,
@@ -82,8 +83,8 @@ fn twists(reading: &Reading, orientation: bool, present: &[Present]) -> Vec<Disp
     let joints = reading.joints.len();
     let mut twists = vec![[0.0; 6]; joints + 2];
     for one in present {
-        let at = place(&one.hypothesis, joints).unwrap_or(joints + 1);
-        let columns = one.hypothesis.shape.columns(reading, orientation);
+        let at = place(&one.location, joints).unwrap_or(joints + 1);
+        let columns = one.shape.columns(reading, orientation);
         for (column, value) in columns.iter().zip(&one.coefficients) {
             twists[at].iter_mut().zip(column).for_each(|(sum, moved)| *sum += moved * value);
         }

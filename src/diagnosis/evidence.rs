@@ -6,11 +6,9 @@ use std::sync::Arc;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::products::Marginal;
+use super::settings::{SCALES, Settings};
 use crate::effects::signature::library::Hypothesis;
 use crate::effects::signature::shape::Shape;
-
-/// Prior standard deviations of a magnitude, in units of its usual one, and how likely each is.
-pub const SCALES: [(f64, f64); 4] = [(1.0, 0.44), (2.5, 0.44), (12.0, 0.10), (150.0, 0.02)];
 
 /// What is known of the noise beforehand: so many readings' worth (degrees of freedom) of a mean square, in declared sigmas.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,6 +124,8 @@ pub struct Evidence<'a> {
     pub candidates: &'a Candidates,
     /// What is known of the noise.
     pub noise: NoisePrior,
+    /// What is likely beforehand, and how it is searched.
+    pub settings: &'a Settings,
 }
 
 /// An effect more.
@@ -143,7 +143,8 @@ impl<'a> Evidence<'a> {
         for (hypothesis, scale) in members {
             for column in self.candidates.columns(*hypothesis) {
                 columns.push(column);
-                precision.push(1.0 / (SCALES[*scale].0 * SCALES[*scale].0));
+                let [size, _] = self.settings.prior.scales[*scale];
+                precision.push(1.0 / (size * size));
             }
         }
         let count = columns.len();
@@ -189,7 +190,7 @@ impl<'a> Evidence<'a> {
         let mut at = 0;
         let mut total = self.log_ratio(model.drop, model.log_determinant) + log_multiplicity(members.len());
         for (hypothesis, scale) in members {
-            total += self.candidates.log_odds[*hypothesis] + libm::log(SCALES[*scale].1);
+            total += self.candidates.log_odds[*hypothesis] + libm::log(self.settings.prior.scales[*scale][1]);
             if one_signed(&self.candidates.hypotheses[*hypothesis]) {
                 total += log_allowed(model.coefficients[at], libm::sqrt(level * model.inverse[(at, at)]));
             }
@@ -244,13 +245,13 @@ impl<'a> Evidence<'a> {
         let prior = log_multiplicity(members.len() + 1)
             + members
                 .iter()
-                .map(|(hypothesis, scale)| candidates.log_odds[*hypothesis] + libm::log(SCALES[*scale].1))
+                .map(|(hypothesis, scale)| candidates.log_odds[*hypothesis] + libm::log(self.settings.prior.scales[*scale][1]))
                 .sum::<f64>();
         let rows: Vec<Arc<Vec<f64>>> = base.columns.iter().map(|column| marginal.row(*column)).collect();
         let count = rows.len();
         // Of the columns of one hypothesis: inner products with the members, and what these take of them.
         let (mut cross, mut taken) = (Vec::new(), Vec::new());
-        let mut found = Vec::with_capacity(SCALES.len() * candidates.hypotheses.len());
+        let mut found = Vec::with_capacity(SCALES * candidates.hypotheses.len());
         for hypothesis in 0..candidates.hypotheses.len() {
             if !candidates.active[hypothesis] || members.iter().any(|(member, _)| candidates.exclude(*member, hypothesis)) {
                 continue;
@@ -280,7 +281,7 @@ impl<'a> Evidence<'a> {
             let mut put = |scale: usize, added: f64, log_determinant: f64, first: f64, variance: f64| {
                 let drop = base.drop + added;
                 let mut total = prior + self.log_ratio(drop, base.log_determinant + log_determinant);
-                total += candidates.log_odds[hypothesis] + libm::log(SCALES[scale].1);
+                total += candidates.log_odds[hypothesis] + libm::log(self.settings.prior.scales[scale][1]);
                 if signed {
                     total += log_allowed(first, libm::sqrt(self.level(drop) * variance));
                 }
@@ -288,7 +289,7 @@ impl<'a> Evidence<'a> {
             };
             if width == 1 {
                 let (left, right) = (marginal.own(hypothesis, 0, 0) - product(0, 0), right(0));
-                for (scale, (size, _)) in SCALES.iter().enumerate() {
+                for (scale, [size, _]) in self.settings.prior.scales.iter().enumerate() {
                     let precision = 1.0 / (size * size);
                     let diagonal = left + precision;
                     let coefficient = right / diagonal;
@@ -298,7 +299,7 @@ impl<'a> Evidence<'a> {
             }
             let left = DMatrix::from_fn(width, width, |i, j| marginal.own(hypothesis, i, j) - product(i, j));
             let right = DVector::from_fn(width, |i, _| right(i));
-            for (scale, (size, _)) in SCALES.iter().enumerate() {
+            for (scale, [size, _]) in self.settings.prior.scales.iter().enumerate() {
                 let precision = 1.0 / (size * size);
                 let mut matrix = left.clone();
                 for i in 0..width {

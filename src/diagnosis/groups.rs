@@ -5,18 +5,10 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::conditions::centre;
 use super::outliers::{median, rare};
+use super::settings::Noise;
 use crate::arm::frames::rotation_vector;
 use crate::measurement::Measurement;
 use crate::measurement::equations::{COMPONENTS, Equations};
-
-/// Joint readings that differ by less are of one configuration, rad or m: commanded values come back rounded, or as encoders see them.
-const SAME: f64 = 2e-4;
-/// Temperatures that differ by less are the same, K.
-const SAME_TEMPERATURE: f64 = 0.5;
-/// Contrasts that a noise needs.
-const CONTRASTS: usize = 3;
-/// Pairs of alike readings from which their correlation is estimated rather than assumed.
-const PAIRS: f64 = 6.0;
 
 /// Rows of the same configuration.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,14 +53,14 @@ impl Groups {
 
 /// Groups `measurements` by configuration.
 #[must_use]
-pub fn groups(measurements: &[&Measurement]) -> Groups {
+pub fn groups(measurements: &[&Measurement], settings: &Noise) -> Groups {
     let total = measurements.len();
     let mut by_first: Vec<usize> = (0..total).collect();
     let first = |row: usize| measurements[row].joints.first().copied().unwrap_or(0.0);
     by_first.sort_by(|a, b| first(*a).total_cmp(&first(*b)).then(a.cmp(b)));
     let alike = |a: usize, b: usize| {
         let (a, b) = (&measurements[a].joints, &measurements[b].joints);
-        a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SAME)
+        a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= settings.same_configuration)
     };
     // Each row joins the first row that is like it and has no other to join.
     let mut head: Vec<Option<usize>> = vec![None; total];
@@ -78,7 +70,7 @@ pub fn groups(measurements: &[&Measurement]) -> Groups {
         }
         head[*row] = Some(*row);
         for other in &by_first[place + 1..] {
-            if first(*other) - first(*row) > SAME {
+            if first(*other) - first(*row) > settings.same_configuration {
                 break;
             }
             if head[*other].is_none() && alike(*row, *other) {
@@ -106,7 +98,7 @@ pub fn groups(measurements: &[&Measurement]) -> Groups {
 /// that disagree by far do not count. Readings between which the arm moved come first; where there are too few, those between which
 /// it did not.
 #[must_use]
-pub fn repeats(measurements: &[&Measurement], groups: &Groups) -> Option<Repeats> {
+pub fn repeats(measurements: &[&Measurement], groups: &Groups, settings: &Noise) -> Option<Repeats> {
     let mut in_time: Vec<usize> = (0..measurements.len()).collect();
     in_time.sort_by(|a, b| measurements[*a].time_s.total_cmp(&measurements[*b].time_s).then(a.cmp(b)));
     let mut place = vec![0; measurements.len()];
@@ -118,7 +110,7 @@ pub fn repeats(measurements: &[&Measurement], groups: &Groups) -> Option<Repeats
     let axes = read.iter().filter(|read| **read).count();
     let equal = |a: &Measurement, b: &Measurement| {
         let near = |a: Option<f64>, b: Option<f64>| match (a, b) {
-            (Some(a), Some(b)) => (a - b).abs() <= SAME_TEMPERATURE,
+            (Some(a), Some(b)) => (a - b).abs() <= settings.same_temperature_k,
             (a, b) => a.is_none() && b.is_none(),
         };
         a.target == b.target
@@ -171,7 +163,7 @@ pub fn repeats(measurements: &[&Measurement], groups: &Groups) -> Option<Repeats
     }
     // One sigma and its degrees of freedom.
     let sigma = |squares: &[f64], axes: usize| {
-        if squares.len() < CONTRASTS || axes == 0 {
+        if squares.len() < settings.contrasts || axes == 0 {
             return None;
         }
         let mut sorted = squares.to_vec();
@@ -203,7 +195,7 @@ fn contrasts(points: &[Vector3<f64>]) -> Vec<f64> {
 /// Weights of rows whose residuals (of all `equations`, whitened) are alike within a group: a group of `n` rows with the
 /// intraclass correlation ρ tells as much as `n / (1 + (n − 1) ρ)` independent ones. `good`: rows that are no outliers. Also ρ.
 #[must_use]
-pub fn weights(groups: &Groups, residual: &[f64], equations: &Equations, good: &[bool]) -> (Vec<f64>, f64) {
+pub fn weights(groups: &Groups, residual: &[f64], equations: &Equations, good: &[bool], settings: &Noise) -> (Vec<f64>, f64) {
     // What was read of a component of the pose.
     let of = |row: usize, component: usize| {
         let at = equations.of(row).find(|equation| equations.component(*equation) == component);
@@ -234,7 +226,7 @@ pub fn weights(groups: &Groups, residual: &[f64], equations: &Equations, good: &
     if degrees_of_freedom == 0.0 {
         return (vec![1.0; groups.of.len()], 0.0);
     }
-    let correlation = if degrees_of_freedom < PAIRS || all <= 0.0 {
+    let correlation = if degrees_of_freedom < settings.pairs || all <= 0.0 {
         0.5
     } else {
         (1.0 - (within / of_within) / (all / of_all)).clamp(0.0, 1.0)
@@ -268,9 +260,9 @@ mod tests {
             rows.push(point);
         }
         let rows: Vec<&Measurement> = rows.iter().collect();
-        let groups = groups(&rows);
+        let groups = groups(&rows, &Noise::default());
         assert_eq!(groups.rows.len(), 40);
-        let found = repeats(&rows, &groups).unwrap();
+        let found = repeats(&rows, &groups, &Noise::default()).unwrap();
         assert!(found.moved && (found.position_m / 20e-6 - 1.0).abs() < 0.05, "{found:?}");
         assert!(found.degrees_of_freedom > 950.0);
         assert!((found.orientation_rad.unwrap() / 5e-5 - 1.0).abs() < 0.05, "{found:?}");
@@ -282,7 +274,7 @@ mod tests {
         let mut rows: Vec<Measurement> = (0..120).map(|index| row(index, (index / 3) as f64, 0.0)).collect();
         rows.iter_mut().for_each(|row| row.position_m = [0, 1, 2].map(|_| 1e-5 * stream.normal()));
         let rows: Vec<&Measurement> = rows.iter().collect();
-        let found = repeats(&rows, &groups(&rows)).unwrap();
+        let found = repeats(&rows, &groups(&rows, &Noise::default()), &Noise::default()).unwrap();
         assert!(!found.moved && (found.position_m / 1e-5 - 1.0).abs() < 0.15, "{found:?}");
     }
 
@@ -290,7 +282,7 @@ mod tests {
     fn alike_residuals_count_once_and_independent_ones_each_time() {
         let rows: Vec<Measurement> = (0..80).map(|index| row(index, (index / 4) as f64, 0.0)).collect();
         let rows: Vec<&Measurement> = rows.iter().collect();
-        let groups = groups(&rows);
+        let groups = groups(&rows, &Noise::default());
         let sensor = crate::measurement::Sensor {
             position_in_base: nalgebra::Point3::origin(),
             position_sigma_m: 1.0,
@@ -303,10 +295,10 @@ mod tests {
         let mut stream = stream(3, "test/repeats");
         let shared: Vec<f64> = (0..20).map(|_| stream.normal()).collect();
         let alike: Vec<f64> = (0..240).map(|at| shared[at / 12]).collect();
-        let (weights_alike, correlation) = weights(&groups, &alike, &equations, &[true; 80]);
+        let (weights_alike, correlation) = weights(&groups, &alike, &equations, &[true; 80], &Noise::default());
         assert!((correlation - 1.0).abs() < 1e-9 && (weights_alike[0] - 0.25).abs() < 1e-9);
         let independent: Vec<f64> = (0..240).map(|_| stream.normal()).collect();
-        let (free, correlation) = weights(&groups, &independent, &equations, &[true; 80]);
+        let (free, correlation) = weights(&groups, &independent, &equations, &[true; 80], &Noise::default());
         assert!(correlation < 0.1 && free[0] > 0.75, "{correlation}");
     }
 }

@@ -8,12 +8,12 @@
 use nalgebra::{DVector, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::FOLDS;
 use super::evidence::{Evidence, NoisePrior};
 use super::groups::Groups;
 use super::linear::Linear;
 use super::products::{Marginal, Products};
 use super::search::climb;
+use super::settings::{self, Settings};
 use crate::measurement::Measurement;
 
 /// What one fold says.
@@ -103,12 +103,12 @@ pub enum Block {
 /// The ways of leaving out that `measurements` allow: by region first, then by payload and by session where there are several. Rows of
 /// a configuration stay together in a region.
 #[must_use]
-pub fn schemes(measurements: &[&Measurement], targets: &[Vector3<f64>], groups: &Groups) -> Vec<Scheme> {
+pub fn schemes(measurements: &[&Measurement], targets: &[Vector3<f64>], groups: &Groups, folds: usize) -> Vec<Scheme> {
     let points: Vec<Vector3<f64>> = groups.rows.iter().map(|rows| targets[rows[0]]).collect();
-    let most = FOLDS.min(points.len() / 4).max(2);
+    let most = folds.min(points.len() / 4).max(2);
     let of_group = regions(&points, most);
     let by_region = groups.of.iter().map(|group| of_group[*group]).collect();
-    let mut schemes = vec![Scheme::new(Block::Region, by_region, &[])];
+    let mut schemes = vec![Scheme::new(Block::Region, by_region, &[], folds)];
     let payload: Vec<f64> = measurements.iter().map(|row| row.payload_kg.unwrap_or(0.0)).collect();
     let session: Vec<&str> = measurements.iter().map(|row| row.session.as_deref().unwrap_or_default()).collect();
     let mut payloads = payload.clone();
@@ -118,12 +118,12 @@ pub fn schemes(measurements: &[&Measurement], targets: &[Vector3<f64>], groups: 
     sessions.sort_unstable();
     sessions.dedup();
     let number = |of: &dyn Fn(usize) -> usize| (0..measurements.len()).map(of).collect::<Vec<_>>();
-    let at_payload = number(&|row| payloads.iter().position(|known| *known == payload[row]).unwrap_or(0) % FOLDS);
-    let at_session = number(&|row| sessions.iter().position(|known| *known == session[row]).unwrap_or(0) % FOLDS);
+    let at_payload = number(&|row| payloads.iter().position(|known| *known == payload[row]).unwrap_or(0) % folds);
+    let at_session = number(&|row| sessions.iter().position(|known| *known == session[row]).unwrap_or(0) % folds);
     let payloads: Vec<String> = payloads.iter().map(|kg| format!("{kg} kg")).collect();
     let sessions: Vec<String> = sessions.iter().map(|name| (*name).to_owned()).collect();
     for (by, fold, names) in [(Block::Payload, at_payload, payloads), (Block::Session, at_session, sessions)] {
-        let scheme = Scheme::new(by, fold, &names);
+        let scheme = Scheme::new(by, fold, &names, folds);
         if (0..scheme.folds).any(|out| scheme.leaves_enough(out)) && scheme.folds > 1 {
             schemes.push(scheme);
         }
@@ -138,14 +138,14 @@ impl Scheme {
     }
 
     /// `names`: of what each fold holds; those beyond the number of folds share one.
-    fn new(by: Block, fold: Vec<usize>, names: &[String]) -> Scheme {
+    fn new(by: Block, fold: Vec<usize>, names: &[String], most: usize) -> Scheme {
         // Regions may be empty.
         let mut known = fold.clone();
         known.sort_unstable();
         known.dedup();
         let fold: Vec<usize> = fold.iter().map(|of| known.binary_search(of).unwrap_or(0)).collect();
         let name = |fold: &usize| {
-            let of_fold: Vec<&str> = names.iter().skip(*fold).step_by(FOLDS).map(String::as_str).collect();
+            let of_fold: Vec<&str> = names.iter().skip(*fold).step_by(most).map(String::as_str).collect();
             of_fold.join(", ")
         };
         Scheme { by, folds: known.len(), names: known.iter().map(name).collect(), fold }
@@ -194,8 +194,8 @@ pub struct Validation<'a> {
     pub good: &'a [bool],
     /// The best set of all readings.
     pub best: &'a [(usize, usize)],
-    /// Effects of a set at most.
-    pub most: usize,
+    /// How it is searched, and what counts.
+    pub settings: &'a Settings,
 }
 
 impl Validation<'_> {
@@ -213,7 +213,7 @@ impl Validation<'_> {
                 Some(Fold { name: scheme.names[number].clone(), ..fold })
             })
             .collect();
-        let used: Vec<usize> = (0..folds.len()).map(|number| used(&folds, number)).collect();
+        let used: Vec<usize> = (0..folds.len()).map(|number| used(&folds, number, &self.settings.validation)).collect();
         for (fold, used) in folds.iter_mut().zip(used) {
             fold.used = used;
             fold.explained = fold.with_first_chosen(used);
@@ -228,8 +228,9 @@ impl Validation<'_> {
         }
         let linear = self.linear;
         let marginal = Marginal::new(products, Some(number), &linear.prior)?;
-        let evidence = Evidence { marginal: &marginal, candidates: linear.candidates, noise: self.noise };
-        let (chosen, _) = climb(&evidence, &[], self.most);
+        let evidence =
+            Evidence { marginal: &marginal, candidates: linear.candidates, noise: self.noise, settings: self.settings };
+        let (chosen, _) = climb(&evidence, &[], self.settings.search.most);
         let squares = |members: &[(usize, usize)]| {
             let coefficients = evidence.coefficients(members);
             linear.squares(rows, &marginal.geometry(&coefficients), &linear.made(&coefficients))
@@ -260,8 +261,8 @@ impl Validation<'_> {
 
 /// How many of the effects chosen for fold `number` are used, by what as many of theirs did to the other folds: the most with which
 /// those were predicted no worse than by geometry alone, in the mean of the logarithms of how much less is left. No fold's gain counts
-/// for more than a factor of e, and no loss for more than e³: one that goes wild outvotes others, and others do not outvote it. All of them where fewer than two other folds can tell.
-pub(super) fn used(folds: &[Fold], number: usize) -> usize {
+/// for more than [`settings::Validation::largest_gain`], and no loss for more than `largest_loss`: one that goes wild outvotes others, and others do not outvote it. All of them where fewer than two other folds can tell.
+pub(super) fn used(folds: &[Fold], number: usize, settings: &settings::Validation) -> usize {
     let chosen = folds[number].with_chosen.len();
     let others = || folds.iter().enumerate().filter(|(other, _)| *other != number).map(|(_, fold)| fold);
     let count = others().count() as f64;
@@ -270,7 +271,10 @@ pub(super) fn used(folds: &[Fold], number: usize) -> usize {
     }
     let no_worse = |effects: &usize| {
         let logs: Vec<f64> = others()
-            .map(|fold| libm::log(fold.with_first_chosen(*effects) / fold.geometry.max(1e-300)).clamp(-1.0, 3.0))
+            .map(|fold| {
+                libm::log(fold.with_first_chosen(*effects) / fold.geometry.max(1e-300))
+                    .clamp(-settings.largest_gain, settings.largest_loss)
+            })
             .collect();
         logs.iter().sum::<f64>() <= 0.0
     };

@@ -1,15 +1,16 @@
 //! How large a named effect is, with its interval.
 
 use super::Analysis;
-use super::evidence::{Fit, SCALES, one_signed};
+use super::evidence::{Fit, one_signed};
 use super::outcome::Magnitude;
+use super::settings::{Decision, SCALES};
 use crate::effects::{Kind, Load};
 use crate::numerics::distribution::{NORMAL_95, student_quantile};
 
 /// The best set fitted with the widest prior there is, so that it pulls next to nothing: what magnitudes and all else that effects have
 /// are told from.
 pub(super) fn unpulled(analysis: &Analysis<'_>) -> Option<Fit> {
-    let widest = SCALES.len() - 1;
+    let widest = SCALES - 1;
     let members: Vec<(usize, usize)> = analysis.found.best.iter().map(|(member, _)| (*member, widest)).collect();
     analysis.evidence.fit(&members)
 }
@@ -29,7 +30,7 @@ pub(super) fn magnitude(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -
     let name = of.kind.map_or("", Kind::unit).to_owned();
     let load = is_driven_by_load(of.kind) && !analysis.linear.rows.mechanism.masses_known;
     let name = if load { "relative (no masses)".to_owned() } else { name };
-    let model = model_sigma(of.kind);
+    let model = model_sigma(of.kind, &analysis.options.settings.decision);
     if width == 1 {
         let (mean, sigma) = (value(0), libm::hypot(libm::sqrt(covariance(0, 0)), model * value(0).abs()));
         let interval = [mean - quantile * sigma, mean + quantile * sigma];
@@ -56,8 +57,8 @@ pub(super) fn magnitude(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -
 
 /// How well a signature is known, as a share of the magnitude (one sigma): what loads a joint hangs on levers that calibration cannot
 /// place to better than a millimetre or two in some tenths of a metre.
-fn model_sigma(kind: Option<Kind>) -> f64 {
-    if is_driven_by_load(kind) { 7e-3 } else { 2e-3 }
+fn model_sigma(kind: Option<Kind>, settings: &Decision) -> f64 {
+    if is_driven_by_load(kind) { settings.load_signature } else { settings.signature }
 }
 
 fn is_driven_by_load(kind: Option<Kind>) -> bool {

@@ -32,6 +32,7 @@ pub mod rows;
 pub mod scatter;
 pub mod search;
 mod sentence;
+pub mod settings;
 #[cfg(test)]
 pub(crate) mod tests;
 mod unknown;
@@ -60,31 +61,7 @@ use ripple::Ripple;
 use rows::{DiagnosisError, Readings, Rows};
 use scatter::Scatter;
 use search::{Found, climb};
-
-/// Folds of the cross-validation.
-pub const FOLDS: usize = 5;
-/// Rounds of fitting around what was found.
-const PASSES: usize = 12;
-/// Effects of a set at most.
-const MOST: usize = 24;
-/// Effects of the first pass at most; twice as many in the next one, and so on.
-const FIRST: usize = 4;
-/// Passes in which the geometry's prior is chosen.
-const CHOOSING: usize = 3;
-/// Of the noise, the difference between loads as they are and as commanded that is worth trying both.
-const LOADS_MATTER: f64 = 0.3;
-/// Of the noise, the movement of a target from pass to pass that is nothing.
-const SETTLED_SHARE: f64 = 0.1;
-/// Sigmas of the geometry's prior over those of manufacturing that are tried: the data say how far the arm is from nominal.
-const GEOMETRY_SCALES: [f64; 5] = [3.0, 1.0, 0.3, 0.1, 0.03];
-/// Times that what was found is looked through for joints that do not repeat.
-const LOOKS: usize = 3;
-/// Degrees of freedom of what repeats without a move tell of the noise.
-const UNMOVED: f64 = 4.0;
-/// Correlation of what is left of readings of one configuration from which on it is the configuration's.
-const ALIKE: f64 = 0.9;
-/// Held-out RMS with joints that do not repeat, over that without, from which on there are none.
-const WORSE: f64 = 1.03;
+use settings::Settings;
 
 /// How to diagnose.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,13 +72,15 @@ pub struct Options {
     pub without: Vec<Kind>,
     /// Nothing but these kinds at these places, for who knows what is there.
     pub only: Option<Vec<(Kind, Location)>>,
+    /// Every number that decides.
+    pub settings: Settings,
 }
 
 impl Options {
     /// The whole library.
     #[must_use]
     pub fn new(noise: NoiseSource) -> Options {
-        Options { noise, without: Vec::new(), only: None }
+        Options { noise, without: Vec::new(), only: None, settings: Settings::default() }
     }
 
     /// What is looked for.
@@ -132,11 +111,12 @@ struct Data<'a> {
 
 impl<'a> Data<'a> {
     fn new(arm: &'a Arm, sensor: &'a Sensor, measurements: &'a [&'a Measurement], options: &'a Options) -> Data<'a> {
-        let groups = groups::groups(measurements);
-        let repeats = groups::repeats(measurements, &groups);
+        let settings = &options.settings.noise;
+        let groups = groups::groups(measurements, settings);
+        let repeats = groups::repeats(measurements, &groups, settings);
         let sigma_m = sensor.mean_position_sigma(measurements.iter().copied());
-        let noise = noise_prior(repeats, sigma_m, options.noise);
-        let orientation = weights::orientation_of_repeats(sensor, repeats, sigma_m);
+        let noise = noise_prior(repeats, sigma_m, options.noise, settings);
+        let orientation = weights::orientation_of_repeats(sensor, repeats, sigma_m, settings);
         Data { arm, sensor, measurements, options, groups, repeats, noise, orientation }
     }
 }
@@ -207,8 +187,8 @@ impl State {
     }
 
     /// Whether `pass` found what it was made around. `sigma_m`: noise of a position about an axis.
-    fn is_settled(&self, pass: &Pass, sigma_m: f64) -> bool {
-        let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-2);
+    fn is_settled(&self, pass: &Pass, sigma_m: f64, settings: &settings::Model) -> bool {
+        let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < settings.settled_weight);
         let sorted = |members: &[(usize, usize)]| {
             let mut sorted = members.to_vec();
             sorted.sort_unstable();
@@ -220,7 +200,7 @@ impl State {
             && pass.scale == self.scale
             && pass.complete
             && pass.loads == self.loads
-            && pass.changed_m < SETTLED_SHARE * sigma_m
+            && pass.changed_m < settings.settled * sigma_m
     }
 }
 
@@ -264,16 +244,17 @@ impl Pass {
     /// `number`: of the pass. The geometry's prior is chosen in the first ones, and few effects are looked for, so that the largest
     /// ones are taken as large as they are before anything is looked for beside them.
     fn new(data: &Data<'_>, state: &State, number: usize) -> Result<Pass, DiagnosisError> {
+        let settings = &data.options.settings;
         let weights = state.weights();
         let measurements = data.measurements;
         let orientation_sigma_rad = data.sensor.orientation_sigma_rad.map(|sigma| sigma * state.orientation);
         let sensor = &Sensor { orientation_sigma_rad, ..data.sensor.clone() };
         let readings =
             Readings { sensor, measurements, weights: &weights, displacement: &state.displacement, scatter: &state.scatter };
-        let rows = rows::fit(data.arm, readings)?;
-        let (conditions, displaced) = conditions::conditions(measurements, &rows, &state.present, state.loads);
+        let rows = rows::fit(data.arm, readings, &settings.model)?;
+        let (conditions, displaced) = conditions::conditions(measurements, &rows, &state.present, state.loads, &settings.model);
         let mut candidates = candidates(data.options.hypotheses(&rows, &conditions, &state.ripples));
-        let scheme = held_out::schemes(measurements, &rows.targets, &data.groups).swap_remove(0);
+        let scheme = held_out::schemes(measurements, &rows.targets, &data.groups, settings.validation.folds).swap_remove(0);
         // The effects found so far are taken out as large as they are on the arm as it is fitted now, and put back along their signatures.
         let mut total = rows.residual.clone();
         for (row, now) in displaced.iter().enumerate() {
@@ -290,17 +271,22 @@ impl Pass {
         let Linear { residual: total, prior, .. } = linear;
         let marginal = Marginal::new(&products, None, &prior).ok_or(GeometryError::Degenerate)?;
         let information: Vec<f64> = (0..candidates.hypotheses.len()).map(|number| marginal.information(number)).collect();
-        weigh(&mut candidates, &information);
-        let evidence = Evidence { marginal: &marginal, candidates: &candidates, noise: data.noise };
-        let most = MOST.min(FIRST << number.min(8));
+        weigh(&mut candidates, &information, &settings.prior);
+        let evidence = Evidence { marginal: &marginal, candidates: &candidates, noise: data.noise, settings };
+        let most = settings.search.most.min(settings.model.first << number.min(8));
         let (mut members, _) = climb(&evidence, &state.members, most);
         let mut scale = state.scale;
-        if number < CHOOSING {
+        if number < settings.model.choosing {
             let likelihood = |scale: f64| -> f64 {
                 let other = Marginal::new(&products, None, &prior.scaled(scale));
                 other.map_or(f64::NEG_INFINITY, |other| Evidence { marginal: &other, ..evidence }.log_likelihood(&members))
             };
-            let best = GEOMETRY_SCALES.map(|scale| (likelihood(scale), scale)).into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+            let best = settings
+                .model
+                .geometry_scales
+                .iter()
+                .map(|scale| (likelihood(*scale), *scale))
+                .max_by(|a, b| a.0.total_cmp(&b.0));
             scale = best.map_or(scale, |(_, scale)| scale);
         }
         let again;
@@ -310,7 +296,7 @@ impl Pass {
             again = Marginal::new(&products, None, &prior.scaled(scale)).ok_or(GeometryError::Degenerate)?;
             &again
         };
-        let evidence = Evidence { marginal, candidates: &candidates, noise: data.noise };
+        let evidence = Evidence { marginal, candidates: &candidates, noise: data.noise, settings };
         if scale != state.scale {
             members = climb(&evidence, &members, most).0;
         }
@@ -318,10 +304,10 @@ impl Pass {
         let geometry = marginal.geometry(&coefficients);
         let linear = Linear::new(&rows, &conditions.readings, &candidates, total, scale);
         let residual = linear.left(&geometry, &linear.made(&coefficients));
-        let weighed = weights::weigh(&rows, &residual, &weights, &data.groups);
+        let weighed = weights::weigh(&rows, &residual, &weights, &data.groups, &settings.noise);
         let total = linear.residual;
         let present = present(&candidates, &coefficients);
-        let made = |loads: Loads| conditions::conditions(measurements, &rows, &present, loads).1;
+        let made = |loads: Loads| conditions::conditions(measurements, &rows, &present, loads, &settings.model).1;
         let displacement = made(state.loads);
         let apart = |one: &[Displacement], other: &[Displacement]| {
             let change = |(a, b): (&Displacement, &Displacement)| libm::hypot(libm::hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
@@ -330,7 +316,7 @@ impl Pass {
         let changed_m = apart(&displacement, &displaced);
         let loads_matter_m = apart(&displacement, &made(state.loads.other()));
         Ok(Pass {
-            complete: members.len() < most || most == MOST,
+            complete: members.len() < most || most == settings.search.most,
             log_likelihood: evidence.log_likelihood(&members),
             loads: state.loads,
             loads_matter_m,
@@ -398,18 +384,19 @@ pub fn diagnose(
     measurements: &[&Measurement],
     options: &Options,
 ) -> Result<Diagnosis, DiagnosisError> {
+    let settings = &options.settings;
     let data = Data::new(arm, sensor, measurements, options);
     let (state, pass) = settle(&data)?;
     let linear = pass.linear();
     let marginal = Marginal::new(&pass.products, None, &linear.prior).ok_or(GeometryError::Degenerate)?;
-    let evidence = Evidence { marginal: &marginal, candidates: &pass.candidates, noise: data.noise };
-    let found = search::search(&evidence, &pass.members, MOST);
+    let evidence = Evidence { marginal: &marginal, candidates: &pass.candidates, noise: data.noise, settings };
+    let found = search::search(&evidence, &pass.members, settings.search.most);
     let coefficients = evidence.coefficients(&found.best);
     let residual = linear.left(&marginal.geometry(&coefficients), &linear.made(&coefficients));
     let outliers = outliers_of(&data, &pass, &found);
     let good: Vec<bool> = (0..measurements.len()).map(|row| !outliers.rows.contains(&row)).collect();
-    let validation = Validation { linear: &linear, noise: data.noise, good: &good, best: &found.best, most: MOST };
-    let held_out: Vec<HeldOut> = held_out::schemes(measurements, &pass.rows.targets, &data.groups)
+    let validation = Validation { linear: &linear, noise: data.noise, good: &good, best: &found.best, settings };
+    let held_out: Vec<HeldOut> = held_out::schemes(measurements, &pass.rows.targets, &data.groups, settings.validation.folds)
         .iter()
         .map(|scheme| match scheme.by {
             Block::Region => validation.run(scheme, &pass.products),
@@ -417,7 +404,12 @@ pub fn diagnose(
         })
         .collect();
     let units = data.groups.alike(measurements);
-    let structure = open_set::structure(&pass.conditions, &pass.rows.shifts(&linear.in_sigmas(&residual)), &units);
+    let structure = open_set::structure(
+        &pass.conditions,
+        &pass.rows.shifts(&linear.in_sigmas(&residual)),
+        &units,
+        settings.validation.permutations,
+    );
     // What a calibration leaves, whose prior is that of manufacturing ([`crate::identification::identify_real`]).
     let calibrated = Marginal::new(&pass.products, None, &linear.prior.scaled(1.0)).ok_or(GeometryError::Degenerate)?;
     let geometry_alone = linear.left(&calibrated.geometry(&[]), &DVector::zeros(residual.len()));
@@ -425,7 +417,7 @@ pub fn diagnose(
     let analysis = Analysis {
         moved: moved_most(&linear, &evidence, &found.best),
         residuals: residuals(&pass.rows, measurements, &geometry_alone, &residual),
-        maps: open_set::maps(&pass.conditions, &pass.rows.shifts(&residual)),
+        maps: open_set::maps(&pass.conditions, &pass.rows.shifts(&residual), settings.validation.bins),
         linear: &linear,
         conditions: &pass.conditions,
         evidence,
@@ -448,14 +440,15 @@ pub fn diagnose(
 /// or that repeat others are weighted down, geometry and effects are fitted together, and joints that do not repeat get a variance of
 /// their own. The last pass, and what it was made around.
 fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
+    let settings = &data.options.settings;
     let mut state = State::nominal(data);
     let sigma_m = data.sensor.mean_position_sigma(data.measurements.iter().copied());
-    let (mut last, mut looks) = (PASSES - 1, 0);
+    let (mut last, mut looks) = (settings.model.passes - 1, 0);
     // Without any scatter: held-out errors, and the state to go back to.
     let mut plain: Option<(f64, State)> = None;
     for number in 0.. {
         let mut pass = Pass::new(data, &state, number)?;
-        if number < CHOOSING + 2 && pass.loads_matter_m > LOADS_MATTER * sigma_m {
+        if number < settings.model.choosing + 2 && pass.loads_matter_m > settings.model.loads_matter * sigma_m {
             let other = State { loads: state.loads.other(), ..state.clone() };
             let otherwise = Pass::new(data, &other, number)?;
             if otherwise.log_likelihood > pass.log_likelihood {
@@ -464,13 +457,14 @@ fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
         }
         let linear = pass.linear();
         let marginal = Marginal::new(&pass.products, None, &linear.prior).ok_or(GeometryError::Degenerate)?;
-        let evidence = Evidence { marginal: &marginal, candidates: &pass.candidates, noise: data.noise };
+        let evidence = Evidence { marginal: &marginal, candidates: &pass.candidates, noise: data.noise, settings };
         if number < last {
             let may_tell = state.scatter.is_empty() && data.orientation.is_none();
             let known = state.orientation != 1.0;
-            let ratio = weights::orientation_over_position(&pass.rows, &pass.residual, known).filter(|_| may_tell);
-            let more = ripple::scan(&linear, &pass.residual, evidence.noise_level(&pass.members));
-            if !state.is_settled(&pass, sigma_m) || !more.is_empty() || ratio.is_some() {
+            let ratio =
+                weights::orientation_over_position(&pass.rows, &pass.residual, known, &settings.noise).filter(|_| may_tell);
+            let more = ripple::scan(&linear, &pass.residual, evidence.noise_level(&pass.members), &settings.ripple);
+            if !state.is_settled(&pass, sigma_m, &settings.model) || !more.is_empty() || ratio.is_some() {
                 state = state.after(&pass);
                 state.ripples.extend(more);
                 state.orientation *= ratio.unwrap_or(1.0);
@@ -479,10 +473,11 @@ fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
         }
         // Then, whether a joint does not repeat: its errors are no evidence of anything else. An error that comes again with the
         // configuration is no scatter.
-        let comes_again = data.repeats.is_some_and(|repeats| repeats.moved) && pass.weighed.correlation > ALIKE;
-        let may_scatter = looks < LOOKS && data.options.only.is_none() && !comes_again;
+        let comes_again = data.repeats.is_some_and(|repeats| repeats.moved) && pass.weighed.correlation > settings.noise.alike;
+        let may_scatter = looks < settings.scatter.looks && data.options.only.is_none() && !comes_again;
         // Repeats between which the arm moved have the scatter in them.
-        let of_sensor = NoisePrior { degrees_of_freedom: data.noise.degrees_of_freedom.min(UNMOVED), ..data.noise };
+        let of_sensor =
+            NoisePrior { degrees_of_freedom: data.noise.degrees_of_freedom.min(settings.noise.unmoved_degrees), ..data.noise };
         let found = Found { best: pass.members.clone(), ..Found::default() };
         let looked = may_scatter
             .then(|| scatter::look(&linear, &Evidence { noise: of_sensor, ..evidence }, &found, !state.scatter.is_empty()));
@@ -495,7 +490,7 @@ fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
             let outliers = outliers_of(data, &pass, &found);
             let good: Vec<bool> = (0..linear.count()).map(|row| !outliers.rows.contains(&row)).collect();
             let linear = Linear { candidates: &others, ..linear.clone() };
-            let validation = Validation { linear: &linear, noise: data.noise, good: &good, best: &[], most: MOST };
+            let validation = Validation { linear: &linear, noise: data.noise, good: &good, best: &[], settings };
             validation.run(&pass.scheme, &pass.products).explained()
         };
         if let Some(scatter) = looked.filter(|scatter| !scatter::alike(scatter, &state.scatter)) {
@@ -503,15 +498,15 @@ fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
                 plain = Some((held_out(true), state.clone()));
             }
             state = State { scatter, ..state.after(&pass) };
-            (last, looks) = (number + PASSES, looks + 1);
+            (last, looks) = (number + settings.model.passes, looks + 1);
             continue;
         }
         // Scatter has no order: where readings that were not used are predicted worse with it, it took the place of one that there is.
         if let Some((left, without)) = plain.take_if(|_| !state.scatter.is_empty())
-            && held_out(false) > WORSE * WORSE * left
+            && held_out(false) > settings.scatter.worse * settings.scatter.worse * left
         {
             state = without;
-            (last, looks) = (number + 1, LOOKS);
+            (last, looks) = (number + 1, settings.scatter.looks);
             continue;
         }
         return Ok((state, pass));
@@ -521,9 +516,10 @@ fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
 
 /// Readings that are far off beside what was found.
 fn outliers_of(data: &Data<'_>, pass: &Pass, found: &Found) -> outliers::Outliers {
+    let settings = &data.options.settings.outliers;
     let squares = &pass.weighed.squares;
     let counts = pass.rows.equations.counts();
-    let mut outliers = outliers::look(squares, &counts);
+    let mut outliers = outliers::look(squares, &counts, settings);
     // What play makes of a reading whose side nobody knows says nothing about the sensor.
     let seated = |row: &usize| {
         let undecided =
@@ -534,7 +530,7 @@ fn outliers_of(data: &Data<'_>, pass: &Pass, found: &Found) -> outliers::Outlier
         (0..squares.len()).filter(seated).map(|row| (squares[row], counts[row])).unzip();
     if sure.len() < squares.len() && 2 * sure.len() >= data.measurements.len() {
         let far_off = std::mem::take(&mut outliers.rows);
-        outliers = outliers::Outliers { rows: far_off, ..outliers::look(&sure, &sure_counts) };
+        outliers = outliers::Outliers { rows: far_off, ..outliers::look(&sure, &sure_counts, settings) };
     }
     outliers
 }
@@ -543,6 +539,7 @@ fn outliers_of(data: &Data<'_>, pass: &Pass, found: &Found) -> outliers::Outlier
 pub struct Singles {
     pass: Pass,
     noise: NoisePrior,
+    settings: Settings,
 }
 
 impl Singles {
@@ -553,7 +550,11 @@ impl Singles {
     pub fn new(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], options: &Options) -> Result<Singles, DiagnosisError> {
         let data = Data::new(arm, sensor, measurements, options);
         let state = State::nominal(&data);
-        Ok(Singles { pass: Pass::new(&data, &state, PASSES)?, noise: data.noise })
+        Ok(Singles {
+            pass: Pass::new(&data, &state, options.settings.model.passes)?,
+            noise: data.noise,
+            settings: options.settings.clone(),
+        })
     }
 
     /// The evidence of every hypothesis alone, at every scale of its prior: geometry taken out, marginal likelihoods.
@@ -563,20 +564,30 @@ impl Singles {
         let Some(marginal) = Marginal::new(&self.pass.products, None, &linear.prior) else {
             return Vec::new();
         };
-        Evidence { marginal: &marginal, candidates: &self.pass.candidates, noise: self.noise }.extensions(&[])
+        Evidence { marginal: &marginal, candidates: &self.pass.candidates, noise: self.noise, settings: &self.settings }
+            .extensions(&[])
     }
 }
 
 /// What is known of the noise: from repeats where there are any, else what is said.
-fn noise_prior(repeats: Option<Repeats>, declared_m: f64, source: NoiseSource) -> NoisePrior {
+fn noise_prior(repeats: Option<Repeats>, declared_m: f64, source: NoiseSource, settings: &settings::Noise) -> NoisePrior {
     match (repeats, source) {
         (Some(repeats), _) => {
             let level = (repeats.position_m / declared_m) * (repeats.position_m / declared_m);
             // Without a move between them they say little about the arm.
-            NoisePrior { degrees_of_freedom: repeats.degrees_of_freedom.min(if repeats.moved { 20.0 } else { UNMOVED }), level }
+            NoisePrior {
+                degrees_of_freedom: repeats.degrees_of_freedom.min(if repeats.moved {
+                    settings.repeats_degrees
+                } else {
+                    settings.unmoved_degrees
+                }),
+                level,
+            }
         }
-        (None, NoiseSource::Assumed) => NoisePrior { degrees_of_freedom: 1.0, level: 1.0 },
-        (None, _) => NoisePrior { degrees_of_freedom: 10.0, level: 1.0 },
+        (None, NoiseSource::Assumed) => NoisePrior { degrees_of_freedom: settings.assumed_degrees, level: 1.0 },
+        (None, NoiseSource::Declared | NoiseSource::Repeats) => {
+            NoisePrior { degrees_of_freedom: settings.declared_degrees, level: 1.0 }
+        }
     }
 }
 

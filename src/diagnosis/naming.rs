@@ -1,7 +1,7 @@
 //! What is named.
 
 use super::Analysis;
-use super::claims::{NAMED, claim, place};
+use super::claims::{claim, place};
 use super::gap::Closing;
 use super::magnitude::{magnitude, unpulled};
 use super::outcome::{Effect, Magnitude, Parameters, Place};
@@ -26,7 +26,9 @@ pub(super) fn name(analysis: &Analysis<'_>, closing: &Closing<'_>, unknown: bool
         let this = claim(analysis, *hypothesis);
         let of = &analysis.evidence.candidates.hypotheses[*hypothesis];
         let probability = analysis.found.probability(this);
-        let (Some(fit), Some(kind)) = (unpulled.as_ref().filter(|_| probability >= NAMED), of.kind) else {
+        let (Some(fit), Some(kind)) =
+            (unpulled.as_ref().filter(|_| probability >= analysis.options.settings.decision.named), of.kind)
+        else {
             continue;
         };
         let chosen = folds.iter().filter(|fold| fold.chosen.iter().any(|other| claim(analysis, *other) == this)).count();
@@ -56,10 +58,11 @@ fn outliers(analysis: &Analysis<'_>, closing: &Closing<'_>, unknown: bool) -> Op
     let outliers = &analysis.outliers;
     let is_left_out = analysis.options.without.contains(&Kind::MeasurementOutliers);
     // A misfit has tails, too.
-    let enough = if unknown { 9.0 } else { 4.0 };
+    let settings = &analysis.options.settings;
+    let enough = if unknown { settings.outliers.factor_beside_unknown } else { settings.outliers.factor };
     // So has the error of a joint that does not repeat.
     let scatters = !analysis.scatter.is_empty();
-    let named = outliers.probability >= NAMED && outliers.factor >= enough && !is_left_out && !scatters;
+    let named = outliers.probability >= settings.decision.named && outliers.factor >= enough && !is_left_out && !scatters;
     named.then(|| Effect {
         kind: Kind::MeasurementOutliers,
         location: Place { level: Level::Sensor, index: None, time_s: None },

@@ -8,11 +8,9 @@ use super::outcome::{Gap, NoiseFloor, Residual};
 use super::sentence::whose;
 use crate::effects::signature::posture::Posture;
 
-/// Mean squares of the residual, over the declared one, that are nothing to speak of.
-const USUAL: std::ops::RangeInclusive<f64> = 0.44..=2.25;
-
 /// All of it. `level`: mean square of the residual over the declared one.
 pub(super) fn notes(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFloor, gap: &Gap) -> Vec<String> {
+    let decision = &analysis.options.settings.decision;
     let source = noise_floor.source;
     let mut notes = analysis.conditions.notes.clone();
     notes.extend(analysis.linear.rows.notes.iter().cloned());
@@ -22,7 +20,7 @@ pub(super) fn notes(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFloo
                 .to_owned(),
         );
     }
-    if let Some(correlation) = analysis.correlation.filter(|correlation| *correlation > 0.05) {
+    if let Some(correlation) = analysis.correlation.filter(|correlation| *correlation > decision.correlation) {
         notes.push(format!(
             "readings of the same configuration are alike (correlation {correlation:.2} of what is left): they are weighted down, n of \
              them to n / (1 + {correlation:.2} (n − 1))"
@@ -46,7 +44,7 @@ pub(super) fn notes(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFloo
         ));
     }
     let left = rms_m(analysis, |row| row.after_m);
-    if gap.explained_rms_m > FEW * left.max(gap.noise_rms_m) {
+    if gap.explained_rms_m > decision.few * left.max(gap.noise_rms_m) {
         notes.push(format!(
             "held-out errors ({:.0} µm) are far above what is left of the readings that were used ({:.0} µm): {} readings are too few to \
              tell this arm's geometry, and what is named rests on few",
@@ -64,7 +62,7 @@ pub(super) fn notes(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFloo
         notes
             .push(format!("readings far off, weighted down and not counted in held-out errors: rows {}{more}", names.join(", ")));
     }
-    if !USUAL.contains(&level) {
+    if !(decision.usual_noise[0]..=decision.usual_noise[1]).contains(&level) {
         let joints: Vec<String> = analysis.scatter.iter().map(|one| (one.joint + 1).to_string()).collect();
         let beside =
             if joints.is_empty() { String::new() } else { format!(" (beside the scatter of joint {})", joints.join(" and ")) };
@@ -74,8 +72,6 @@ pub(super) fn notes(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFloo
     notes
 }
 
-/// Held-out RMS over what is left of the readings used, from which on the readings are too few.
-const FEW: f64 = 4.0;
 /// Steps to which joint readings are written, with the unit, rad.
 const STEPS: [(f64, &str); 8] = [
     (std::f64::consts::PI / 180.0, "1°"),
@@ -87,8 +83,6 @@ const STEPS: [(f64, &str); 8] = [
     (std::f64::consts::PI / 1.8e5, "0.001°"),
     (1e-5, "0.00001 rad"),
 ];
-/// Error by rounding over the sensor's from which on it is worth a word.
-const ROUNDED: f64 = 0.3;
 
 /// RMS of one part of the residuals, m.
 fn rms_m(analysis: &Analysis<'_>, part: impl Fn(&Residual) -> [f64; 3]) -> f64 {
@@ -125,7 +119,8 @@ fn rounding(analysis: &Analysis<'_>) -> Vec<String> {
     }
     let before_m = rms_m(analysis, |row| row.before_m);
     // Where less is left, the arm stood where the rounded readings say.
-    let shows = |square: f64| square.sqrt() > ROUNDED * sensor_m && square.sqrt() < 1.5 * before_m;
+    let shows =
+        |square: f64| square.sqrt() > analysis.options.settings.decision.rounded * sensor_m && square.sqrt() < 1.5 * before_m;
     found
         .into_iter()
         .filter(|(_, _, square)| shows(*square))

@@ -8,11 +8,6 @@ use super::outcome::Map;
 use crate::effects::signature::shape::Reading;
 use crate::seed::stream;
 
-/// Permutations of the residual.
-const PERMUTATIONS: usize = 400;
-/// Bins of a map.
-const BINS: usize = 8;
-
 /// What the tests say.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Structure {
@@ -56,7 +51,7 @@ fn orders(conditions: &Conditions, rows: &[usize]) -> Vec<Order> {
 /// Tests `residual` (one vector per row, in sigmas times the root of the row's weight) for likeness of neighbours in every order. The
 /// rows of each of `units` count as one: readings of one configuration are alike without any structure between configurations.
 #[must_use]
-pub fn structure(conditions: &Conditions, residual: &[Vector3<f64>], units: &[Vec<usize>]) -> Structure {
+pub fn structure(conditions: &Conditions, residual: &[Vector3<f64>], units: &[Vec<usize>], permutations: usize) -> Structure {
     let rows: Vec<usize> = units.iter().map(|unit| unit[0]).collect();
     let residual: Vec<Vector3<f64>> = units
         .iter()
@@ -97,7 +92,7 @@ pub fn structure(conditions: &Conditions, residual: &[Vector3<f64>], units: &[Ve
     let observed = statistics(residual);
     let mut stream = stream(1, "diagnosis/permutations");
     let mut shuffled = residual.to_vec();
-    let permuted: Vec<Vec<f64>> = (0..PERMUTATIONS)
+    let permuted: Vec<Vec<f64>> = (0..permutations)
         .map(|_| {
             stream.shuffle(&mut shuffled);
             statistics(&shuffled)
@@ -106,9 +101,9 @@ pub fn structure(conditions: &Conditions, residual: &[Vector3<f64>], units: &[Ve
     let count = observed.len();
     let (mut mean, mut deviation) = (vec![0.0; count], vec![0.0; count]);
     for at in 0..count {
-        mean[at] = permuted.iter().map(|values| values[at]).sum::<f64>() / PERMUTATIONS as f64;
+        mean[at] = permuted.iter().map(|values| values[at]).sum::<f64>() / permutations as f64;
         let variance = permuted.iter().map(|values| (values[at] - mean[at]) * (values[at] - mean[at])).sum::<f64>();
-        deviation[at] = (variance / PERMUTATIONS as f64).sqrt().max(1e-12);
+        deviation[at] = (variance / permutations as f64).sqrt().max(1e-12);
     }
     let strongest = |values: &[f64]| {
         let standard = |at: usize| (values[at] - mean[at]) / deviation[at];
@@ -120,7 +115,7 @@ pub fn structure(conditions: &Conditions, residual: &[Vector3<f64>], units: &[Ve
     let of = at % per_order;
     let what = if of == 0 { "the residual".to_owned() } else { format!("the residual along joint {}", of) };
     Structure {
-        p_value: (above + 1) as f64 / (PERMUTATIONS + 1) as f64,
+        p_value: (above + 1) as f64 / (permutations + 1) as f64,
         r#where: format!("{what} follows {}", orders[at / per_order].name),
         strength,
     }
@@ -128,15 +123,15 @@ pub fn structure(conditions: &Conditions, residual: &[Vector3<f64>], units: &[Ve
 
 /// The mean residual (m) along each joint's motion by its angle, as an angle of the joint.
 #[must_use]
-pub fn maps(conditions: &Conditions, residual_m: &[Vector3<f64>]) -> Vec<Map> {
+pub fn maps(conditions: &Conditions, residual_m: &[Vector3<f64>], bins: usize) -> Vec<Map> {
     let joints = conditions.columns.travel.len();
     (0..joints)
         .map(|joint| {
             let [low, high] = conditions.columns.travel[joint];
-            let width = ((high - low) / BINS as f64).max(1e-12);
-            let (mut over, mut under, mut squares) = ([0.0; BINS], [0.0; BINS], [0.0; BINS]);
+            let width = ((high - low) / bins as f64).max(1e-12);
+            let [mut over, mut under, mut squares] = [0, 1, 2].map(|_| vec![0.0; bins]);
             for (reading, residual) in conditions.readings.iter().zip(residual_m) {
-                let bin = (((reading.joints[joint] - low) / width) as usize).min(BINS - 1);
+                let bin = (((reading.joints[joint] - low) / width) as usize).min(bins - 1);
                 let [x, y, z, ..] = reading.moved(joint, 1.0);
                 let direction = Vector3::new(x, y, z);
                 over[bin] += direction.dot(residual);
@@ -144,11 +139,11 @@ pub fn maps(conditions: &Conditions, residual_m: &[Vector3<f64>]) -> Vec<Map> {
                 squares[bin] += residual.norm_squared() / 3.0 * direction.norm_squared();
             }
             let of = |value: fn(f64, f64, f64) -> f64| -> Vec<f64> {
-                (0..BINS).map(|bin| if under[bin] > 1e-9 { value(over[bin], under[bin], squares[bin]) } else { 0.0 }).collect()
+                (0..bins).map(|bin| if under[bin] > 1e-9 { value(over[bin], under[bin], squares[bin]) } else { 0.0 }).collect()
             };
             Map {
                 joint: joint + 1,
-                angle: (0..BINS).map(|bin| low + (bin as f64 + 0.5) * width).collect(),
+                angle: (0..bins).map(|bin| low + (bin as f64 + 0.5) * width).collect(),
                 mean: of(|over, under, _| over / under),
                 standard_error: of(|_, under, squares| squares.sqrt() / under),
             }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::held_out::Block;
+use super::settings::Settings;
 use crate::effects::signature::shape::{Displacement, Reading, Shape};
 use crate::effects::{Kind, Level};
 
@@ -38,6 +39,9 @@ pub struct Diagnosis {
     pub notes: Vec<String>,
     /// Number of readings used.
     pub readings: usize,
+    /// Every number that decided, where they are not as usual or the version is another.
+    #[serde(default)]
+    pub settings: Settings,
     /// Reading by reading, what is left before and after the causes, and which cause took most of it.
     pub residuals: Vec<Residual>,
 }

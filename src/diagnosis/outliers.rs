@@ -1,5 +1,7 @@
 //! Readings that are far off: their weights, and the evidence that there are any.
 
+use super::settings;
+
 /// Squares (in sigmas) beyond which one reading in a thousand lies where the noise is Gaussian, by the number of its equations.
 const RARE: [f64; 7] = [1.0, 10.83, 13.82, 16.27, 18.47, 20.52, 22.46];
 /// Medians of the same squares.
@@ -51,7 +53,7 @@ pub fn weights(squares: &[f64], counts: &[usize]) -> Vec<f64> {
 
 /// The evidence for outliers among readings with these squared residuals, of so many equations each.
 #[must_use]
-pub fn look(squares: &[f64], counts: &[usize]) -> Outliers {
+pub fn look(squares: &[f64], counts: &[usize], settings: &settings::Outliers) -> Outliers {
     let level = level(squares, counts);
     let density =
         |(square, count): (f64, usize), scale: f64| libm::exp(-0.5 * square / scale) / libm::pow(scale, 0.5 * count as f64);
@@ -84,17 +86,17 @@ pub fn look(squares: &[f64], counts: &[usize]) -> Outliers {
         .flat_map(|share| factors.iter().map(move |factor| (*share, *factor)))
         .map(|(share, factor)| (share, factor, total(share, factor)))
         .collect();
-    let log_odds = log_mean(&grid.iter().map(|(_, _, log)| *log).collect::<Vec<_>>()) - plain + libm::log(0.04);
+    let log_odds = log_mean(&grid.iter().map(|(_, _, log)| *log).collect::<Vec<_>>()) - plain + libm::log(settings.odds);
     let (share, factor, _) = grid.iter().copied().max_by(|a, b| a.2.total_cmp(&b.2)).unwrap_or((0.0, 1.0, 0.0));
     let probability = 1.0 / (1.0 + libm::exp(-log_odds));
     let responsible = |one: (f64, usize)| {
         let (far, near) = (share * density(one, level * factor * factor), (1.0 - share) * density(one, level));
         if far + near > 0.0 { far / (far + near) } else { 1.0 }
     };
-    let rows: Vec<usize> = if probability < 0.5 {
+    let rows: Vec<usize> = if probability < settings.there {
         Vec::new()
     } else {
-        (0..squares.len()).filter(|row| responsible(readings[*row]) > 0.99).collect()
+        (0..squares.len()).filter(|row| responsible(readings[*row]) > settings.row).collect()
     };
     let (n, expected) = (squares.len() as f64, readings.iter().map(|one| responsible(*one)).sum::<f64>());
     // Some of them are hidden among the good ones; the count is binomial (Wilson's interval).

@@ -8,25 +8,14 @@ use std::ops::Range;
 
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 
-use super::evidence::{Candidates, Evidence, NoisePrior, SCALES, one_signed};
+use super::evidence::{Candidates, Evidence, NoisePrior, one_signed};
 use super::products::Marginal;
+use super::settings::{SCALES, Settings};
 use crate::numerics::transposed_product;
 use crate::seed::stream;
 
-/// Share of cases in which the least magnitude is named.
-const POWER: f64 = 0.8;
-/// From this probability on something is named.
-const NAMED: f64 = 0.5;
-/// Draws of a claim, shared by its variants.
-const DRAWS: usize = 192;
-/// Variants of a claim that are taken as the truth.
-const TRUTHS: usize = 4;
-/// Variants of the same claim, and rivals, that are looked at.
-const ALIKE: [usize; 2] = [9, 10];
 /// Columns of all that is looked at.
 const COLUMNS: usize = 64;
-/// Likeness from which on a rival is looked at.
-const UNLIKE: f64 = 0.01;
 /// Differences of log posterior beyond which a rival adds nothing.
 const NEGLIGIBLE: f64 = 9.0;
 /// Log prior odds of what is not in play.
@@ -45,6 +34,7 @@ pub struct Power {
 
 /// Finds what a data set would show.
 pub struct Bench<'a> {
+    settings: &'a Settings,
     candidates: &'a Candidates,
     marginal: &'a Marginal<'a>,
     prior: NoisePrior,
@@ -78,7 +68,7 @@ struct Member {
     signed: bool,
     columns: Range<usize>,
     /// By scale, all that no draw changes.
-    constant: [f64; SCALES.len()],
+    constant: [f64; SCALES],
     largest: f64,
 }
 
@@ -86,11 +76,13 @@ struct Member {
 struct World {
     members: Vec<Member>,
     /// By column, one over inner product and precision of each scale.
-    inverse: Vec<[f64; SCALES.len()]>,
+    inverse: Vec<[f64; SCALES]>,
     /// Draw by draw: what a unit magnitude adds to the inner products with the residual, and the noise in them.
     signal: Vec<f64>,
     noise: Vec<f64>,
     draws: Vec<Draw>,
+    /// From this probability on something is named.
+    named: f64,
     /// Half the equations, and what the residual's square has beside them.
     half: f64,
     pinned: f64,
@@ -107,7 +99,7 @@ impl<'a> Bench<'a> {
     /// For data with this `evidence`, with a noise of mean square `noise` (in declared sigmas), and with the effects `found`, beside which everything else has to show.
     #[must_use]
     pub fn new(evidence: &Evidence<'a>, noise: f64, found: &'a [(usize, usize)]) -> Bench<'a> {
-        let Evidence { marginal, candidates, noise: prior } = *evidence;
+        let Evidence { marginal, candidates, noise: prior, settings } = *evidence;
         let inverses = (0..candidates.hypotheses.len())
             .map(|hypothesis| {
                 let columns = candidates.columns(hypothesis);
@@ -116,7 +108,8 @@ impl<'a> Bench<'a> {
             })
             .collect();
         let mut stream = stream(0, "power");
-        let mut quantiles: Vec<f64> = (0..DRAWS).map(|draw| normal_quantile((draw as f64 + 0.5) / DRAWS as f64)).collect();
+        let mut quantiles: Vec<f64> =
+            (0..settings.power.draws).map(|draw| normal_quantile((draw as f64 + 0.5) / settings.power.draws as f64)).collect();
         stream.shuffle(&mut quantiles);
         let pool = quantiles
             .into_iter()
@@ -128,7 +121,7 @@ impl<'a> Bench<'a> {
                 turn: stream.uniform(0.2, 1.0),
             })
             .collect();
-        Bench { candidates, marginal, prior, noise: noise.max(1e-12), found, inverses, pool }
+        Bench { settings, candidates, marginal, prior, noise: noise.max(1e-12), found, inverses, pool }
     }
 
     fn information(&self, hypothesis: usize) -> f64 {
@@ -160,7 +153,7 @@ impl<'a> Bench<'a> {
         if seen.is_empty() || 2 * seen.len() < variants.len() {
             return Power { least: None, alike: None };
         }
-        let count = seen.len().min(TRUTHS);
+        let count = seen.len().min(self.settings.power.truths);
         let mut alike: Option<(usize, f64)> = None;
         let mut worlds = Vec::with_capacity(count);
         for number in 0..count {
@@ -191,7 +184,8 @@ impl<'a> Bench<'a> {
                 .map(|((world, draw), (low, high))| if low == high { *low } else { world.is_named(draw, size) })
                 .collect()
         };
-        let enough = |named: &[bool]| named.iter().filter(|named| **named).count() as f64 >= POWER * draws as f64;
+        let enough =
+            |named: &[bool]| named.iter().filter(|named| **named).count() as f64 >= self.settings.power.share * draws as f64;
         let (never, always) = (vec![false; draws], vec![true; draws]);
         let mean = worlds.iter().flat_map(|world| &world.draws).map(|draw| draw.signal).sum::<f64>() / draws.max(1) as f64;
         if draws == 0 || mean <= 0.0 {
@@ -243,11 +237,11 @@ impl<'a> Bench<'a> {
         let apart = |member: usize| !variants.contains(&member) && !self.candidates.exclude(member, truth);
         let beside: Vec<(usize, usize)> = self.found.iter().copied().filter(|(member, _)| apart(*member)).collect();
         let taken = |other: usize| beside.iter().any(|(member, _)| self.candidates.exclude(*member, other));
-        shares.retain(|(other, share)| *share >= UNLIKE && !taken(*other));
+        shares.retain(|(other, share)| *share >= self.settings.power.unlike && !taken(*other));
         shares.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let mut chosen = vec![truth];
         let mut room = COLUMNS - self.candidates.columns(truth).len();
-        let mut left = ALIKE;
+        let mut left = self.settings.power.alike;
         for (other, _) in &shares {
             let (width, which) = (self.candidates.columns(*other).len(), usize::from(!variants.contains(other)));
             if left[which] > 0 && width <= room {
@@ -266,7 +260,9 @@ impl<'a> Bench<'a> {
         let fitted: Vec<(usize, f64)> = beside
             .iter()
             .flat_map(|(member, scale)| {
-                self.candidates.columns(*member).map(|column| (column, 1.0 / (SCALES[*scale].0 * SCALES[*scale].0)))
+                self.candidates
+                    .columns(*member)
+                    .map(|column| (column, 1.0 / (self.settings.prior.scales[*scale][0] * self.settings.prior.scales[*scale][0])))
             })
             .collect();
         if !fitted.is_empty() {
@@ -279,7 +275,7 @@ impl<'a> Bench<'a> {
         }
         let mut axes = DMatrix::zeros(size, size);
         let mut members = Vec::with_capacity(chosen.len());
-        let mut inverse = vec![[0.0; SCALES.len()]; size];
+        let mut inverse = vec![[0.0; SCALES]; size];
         let mut first = 0;
         for hypothesis in chosen {
             let width = self.candidates.columns(hypothesis).len();
@@ -292,8 +288,8 @@ impl<'a> Bench<'a> {
             };
             axes.view_mut((first, first), (width, width)).copy_from(&vectors);
             let log_odds = self.candidates.log_odds[hypothesis];
-            let mut constant = [if log_odds.is_finite() { log_odds } else { OUT_OF_PLAY }; SCALES.len()];
-            for (scale, (size, share)) in SCALES.iter().enumerate() {
+            let mut constant = [if log_odds.is_finite() { log_odds } else { OUT_OF_PLAY }; SCALES];
+            for (scale, [size, share]) in self.settings.prior.scales.iter().enumerate() {
                 constant[scale] += libm::log(*share);
                 for (i, value) in values.iter().enumerate() {
                     inverse[first + i][scale] = 1.0 / (value + 1.0 / (size * size));
@@ -318,6 +314,7 @@ impl<'a> Bench<'a> {
             signal: Vec::new(),
             noise: Vec::new(),
             draws: Vec::new(),
+            named: self.settings.decision.named,
             half: 0.5 * (self.prior.degrees_of_freedom + self.marginal.degrees_of_freedom),
             pinned: self.prior.degrees_of_freedom * self.prior.level,
         };
@@ -479,7 +476,7 @@ impl World {
         let before = self.pinned + residual;
         let mut tally = Tally { top: 0.0, own: 0.0, other: 1.0, top_is_own: false };
         for member in &self.members {
-            let mut drops = [0.0; SCALES.len()];
+            let mut drops = [0.0; SCALES];
             let mut right = 0.0;
             for column in member.columns.clone() {
                 right = noise[column] + size * signal[column];
@@ -488,7 +485,7 @@ impl World {
                 }
             }
             // The widest prior explains most; −log(1 − x) is x / (1 − x) at most.
-            let share = (drops[SCALES.len() - 1] / before).min(1.0 - 1e-9);
+            let share = (drops[SCALES - 1] / before).min(1.0 - 1e-9);
             if member.largest + self.half * share / (1.0 - share) < tally.top - NEGLIGIBLE {
                 continue;
             }
@@ -502,7 +499,7 @@ impl World {
                 tally.add(log, member.own);
             }
         }
-        tally.top_is_own && tally.own >= NAMED * (tally.own + tally.other)
+        tally.top_is_own && tally.own >= self.named * (tally.own + tally.other)
     }
 }
 
@@ -567,13 +564,14 @@ mod tests {
     /// Cases row by row, with the evidence of the search itself.
     #[test]
     fn the_least_magnitude_is_named_in_four_cases_of_five() {
+        let settings = Settings::default();
         let prior = NoisePrior { degrees_of_freedom: 10.0, level: 1.0 };
         let noise: f64 = 1.7;
         for (likeness, found) in [(0.2, vec![]), (0.9, vec![]), (0.6, vec![(5, 1)])] {
             let (candidates, signatures) = problem(likeness);
             let products = test_marginal(&candidates, &signatures, &DVector::zeros(ROWS));
             let unit = products.marginal();
-            let evidence = Evidence { marginal: &unit, candidates: &candidates, noise: prior };
+            let evidence = Evidence { marginal: &unit, candidates: &candidates, noise: prior, settings: &settings };
             let bench = Bench::new(&evidence, noise, &found);
             let base = |with: &[(usize, usize)]| [&found[..], with].concat();
             for variants in [vec![0], vec![1], vec![3, 4], vec![6]] {
@@ -596,12 +594,12 @@ mod tests {
                     }
                     let products = test_marginal(&candidates, &signatures, &residual);
                     let seen = products.marginal();
-                    let evidence = Evidence { marginal: &seen, candidates: &candidates, noise: prior };
+                    let evidence = Evidence { marginal: &seen, candidates: &candidates, noise: prior, settings: &settings };
                     let without = evidence.log_posterior(&base(&[]));
                     let (mut own, mut all, mut best) = (0.0, 1.0, (0.0, false));
                     for member in (0..candidates.hypotheses.len()).filter(|member| found.iter().all(|(other, _)| other != member))
                     {
-                        for scale in 0..SCALES.len() {
+                        for scale in 0..SCALES {
                             let log = evidence.log_posterior(&base(&[(member, scale)])) - without;
                             all += log.exp();
                             if variants.contains(&member) {
@@ -626,10 +624,11 @@ mod tests {
         let (candidates, mut signatures) = problem(0.2);
         let copy = signatures.column(0) * 1.0;
         signatures.set_column(1, &copy);
+        let settings = Settings::default();
         let noise = NoisePrior { degrees_of_freedom: 10.0, level: 1.0 };
         let products = test_marginal(&candidates, &signatures, &DVector::zeros(ROWS));
         let unit = products.marginal();
-        let evidence = Evidence { marginal: &unit, candidates: &candidates, noise };
+        let evidence = Evidence { marginal: &unit, candidates: &candidates, noise, settings: &settings };
         let bench = Bench::new(&evidence, 1.0, &[]);
         // Of two that are the same the one that is less likely beforehand is never named.
         let power = bench.power(&[1]);
@@ -639,7 +638,7 @@ mod tests {
         let noise = NoisePrior { degrees_of_freedom: 10.0, level: 1.0 };
         let products = test_marginal(&candidates, &signatures, &DVector::zeros(ROWS));
         let unit = products.marginal();
-        let evidence = Evidence { marginal: &unit, candidates: &candidates, noise };
+        let evidence = Evidence { marginal: &unit, candidates: &candidates, noise, settings: &settings };
         let bench = Bench::new(&evidence, 1.0, &[]);
         assert_eq!(bench.power(&[6]), Power { least: None, alike: None });
     }

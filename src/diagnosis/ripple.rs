@@ -4,15 +4,10 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::linear::Linear;
+use super::settings;
 use crate::effects::signature::library::RIPPLES;
 use crate::effects::signature::shape::Shape;
 use crate::numerics::gram;
-
-/// Drop of the residual's square, in squares of the noise, from which on a ripple is worth a hypothesis: what the strongest of some
-/// thousands of ripples reaches by chance.
-const WORTH: f64 = 16.0;
-/// Ripples taken from one scan.
-const MOST: usize = 3;
 
 /// A ripple found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +22,7 @@ pub(super) struct Ripple {
 
 /// The strongest ripple of each joint in `residual` (m, rad), whose noise has the mean square `level` in declared sigmas; the strongest
 /// first, none that is weak or a candidate already.
-pub(super) fn scan(linear: &Linear<'_>, residual: &DVector<f64>, level: f64) -> Vec<Ripple> {
+pub(super) fn scan(linear: &Linear<'_>, residual: &DVector<f64>, level: f64, settings: &settings::Ripple) -> Vec<Ripple> {
     use rayon::prelude::*;
     let (readings, candidates) = (linear.readings, linear.candidates);
     let geometry = linear.rows.jacobian.ncols();
@@ -80,12 +75,12 @@ pub(super) fn scan(linear: &Linear<'_>, residual: &DVector<f64>, level: f64) -> 
             };
             RIPPLES
                 .map(|waves| Ripple { joint, waves, drop: drop(waves) })
-                .filter(|one| one.drop >= WORTH)
+                .filter(|one| one.drop >= settings.worth)
                 .max_by(|a, b| a.drop.total_cmp(&b.drop).then(b.waves.cmp(&a.waves)))
         })
         .filter(|one| !known(one.joint, one.waves))
         .collect();
     found.sort_by(|a, b| b.drop.total_cmp(&a.drop).then(a.joint.cmp(&b.joint)));
-    found.truncate(MOST);
+    found.truncate(settings.most);
     found
 }

@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::mistake;
 use super::scatter::Scatter;
+use super::settings::Model;
 use crate::arm::Arm;
 use crate::arm::frames::Pose;
 use crate::effects::signature::posture::{Mechanism, Posture};
@@ -15,12 +16,6 @@ use crate::identification::geometry::{self, GeometryError};
 use crate::measurement::equations::Equations;
 use crate::measurement::{Measurement, Sensor};
 use crate::solver::whitening::Whitening;
-
-/// Fitted errors of a frame over their prior's sigma beyond which it is another robot, or its readings are wrong.
-const IMPLAUSIBLE: f64 = 12.0;
-/// RMS distance that is left, over the length of the arm (but at least of a small one, m), from which on it is another robot.
-const ASTRAY: f64 = 0.05;
-const SMALL_ARM: f64 = 0.1;
 
 /// Why nothing can be diagnosed.
 #[derive(Clone, Debug, thiserror::Error, PartialEq)]
@@ -143,7 +138,7 @@ pub struct Readings<'a> {
 ///
 /// # Errors
 /// If the measurements cannot tell.
-pub fn fit(arm: &Arm, readings: Readings<'_>) -> Result<Rows, DiagnosisError> {
+pub fn fit(arm: &Arm, readings: Readings<'_>, settings: &Model) -> Result<Rows, DiagnosisError> {
     let Readings { sensor, measurements, weights, displacement, scatter } = readings;
     let scatter: Vec<(usize, f64)> = scatter.iter().map(|one| (one.joint, one.sigma)).collect();
     let fitted = geometry::fit(arm, geometry::Readings { sensor, measurements, weights, displacement, scatter: &scatter })?;
@@ -153,10 +148,10 @@ pub fn fit(arm: &Arm, readings: Readings<'_>) -> Result<Rows, DiagnosisError> {
     let of_position = |row: usize| fitted.residual.rows_range(equations.of_position(row)).norm_squared();
     let squares: f64 = (0..equations.readings()).map(of_position).sum();
     let rms = libm::sqrt(squares / measurements.len() as f64);
-    if rms.is_nan() || rms >= ASTRAY * reach.max(SMALL_ARM) {
+    if rms.is_nan() || rms >= settings.astray * reach.max(settings.small_arm_m) {
         return Err(DiagnosisError::NotThisRobot { rms_mm: rms * 1e3, hint: mistake::hint(arm, measurements) });
     }
-    if fitted.parameters().amax() > IMPLAUSIBLE {
+    if fitted.parameters().amax() > settings.implausible {
         let [shift, turn] = fitted.largest_errors();
         return Err(DiagnosisError::NotThisGeometry {
             shift_mm: shift * 1e3,

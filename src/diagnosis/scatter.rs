@@ -5,25 +5,17 @@
 
 use nalgebra::{DMatrix, DVector, DVectorView};
 
-use super::candidates::odds_of_one_more_nameless;
+use super::candidates::odds_of_one_more_unnamed;
 use super::evidence::{Evidence, NoisePrior};
 use super::linear::Linear;
 use super::rows::Rows;
 use super::search::Found;
+use super::settings;
 use crate::effects::Kind;
 use crate::effects::signature::library::{Hypothesis, RIPPLES};
 use crate::effects::signature::shape::Shape;
 use crate::measurement::equations::Equations;
 use crate::solver::whitening::Whitening;
-
-/// Smallest sigma of a joint's scatter, rad or m; the others are a root of two larger each.
-const SMALLEST: f64 = 5e-6;
-/// Sigmas looked at.
-const STEPS: u8 = 18;
-/// Joints that may scatter.
-const MOST: usize = 2;
-/// Standard deviations by which residuals must point along the joint's motion.
-const ALONG: f64 = 3.5;
 
 /// A joint that does not repeat.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,12 +55,13 @@ pub(super) fn is_contested(of: &Hypothesis) -> bool {
 /// that its ripples and bumps do not stand in for it.
 pub(super) fn look(linear: &Linear<'_>, evidence: &Evidence<'_>, found: &Found, known: bool) -> Vec<Scatter> {
     let (rows, candidates, noise) = (linear.rows, evidence.candidates, evidence.noise);
+    let settings = &evidence.settings.scatter;
     let all = &found.best;
     let fewer: Vec<(usize, usize)> =
         all.iter().filter(|(member, _)| !is_contested(&candidates.hypotheses[*member])).copied().collect();
     // What ripples and bumps are worth where the noise is the sensor's.
     let worth = evidence.log_posterior(all) - evidence.log_posterior(&fewer);
-    let odds = odds_of_one_more_nameless(candidates, rows.mechanism.joint_count());
+    let odds = odds_of_one_more_unnamed(candidates, rows.mechanism.joint_count(), &evidence.settings.prior);
     let left = |members: &[(usize, usize)]| {
         let coefficients = evidence.coefficients(members);
         linear.left(&evidence.marginal.geometry(&coefficients), &linear.made(&coefficients))
@@ -84,12 +77,13 @@ pub(super) fn look(linear: &Linear<'_>, evidence: &Evidence<'_>, found: &Found, 
         let position = Left::of_positions(rows, &residual);
         let mut scatter: Vec<Scatter> = Vec::new();
         let mut total = -lost;
-        while scatter.len() < MOST {
+        while scatter.len() < settings.most {
             let tried = (0..rows.mechanism.joint_count()).filter(|joint| !scatter.iter().any(|one| one.joint == *joint));
-            let values = tried.map(|joint| all.value(evidence.marginal.degrees_of_freedom, noise, &scatter, joint));
+            let values = tried.map(|joint| all.value(evidence.marginal.degrees_of_freedom, noise, &scatter, joint, settings));
             match values.max_by(|a, b| a.0.total_cmp(&b.0)) {
                 Some((gain, one))
-                    if gain + odds > position.lopsided(&scatter).max(0.0) && position.along(&scatter, one.joint) > ALONG =>
+                    if gain + odds > position.lopsided(&scatter).max(0.0)
+                        && position.along(&scatter, one.joint) > settings.along =>
                 {
                     total += gain + odds;
                     scatter.push(Scatter { log_odds: gain + odds, ..one });
@@ -166,15 +160,22 @@ impl<'a> Left<'a> {
     /// Logarithm of the marginal likelihood of the residual with a scatter of `joint` besides `others` over that without, the noise's
     /// level integrated out, the geometry as fitted, and the sigma averaged over; and the best sigma. `freedom`: equations that the
     /// model leaves. A row counts by its weight.
-    fn value(&self, degrees_of_freedom: f64, noise: NoisePrior, others: &[Scatter], joint: usize) -> (f64, Scatter) {
+    fn value(
+        &self,
+        degrees_of_freedom: f64,
+        noise: NoisePrior,
+        others: &[Scatter],
+        joint: usize,
+        settings: &settings::Scatter,
+    ) -> (f64, Scatter) {
         let rows = self.in_sigmas(others, joint);
         let square: f64 = rows.iter().map(|(weight, left, _)| weight * left.norm_squared()).sum();
         let degrees =
             noise.degrees_of_freedom + degrees_of_freedom * self.equations.len() as f64 / self.rows.equations.len() as f64;
         let known = noise.degrees_of_freedom * noise.level;
-        let values: Vec<(f64, f64)> = (0..STEPS)
+        let values: Vec<(f64, f64)> = (0..settings.steps)
             .map(|step| {
-                let sigma = SMALLEST * libm::pow(2.0, 0.5 * f64::from(step));
+                let sigma = settings.smallest * libm::pow(2.0, 0.5 * f64::from(step));
                 let (mut drop, mut volume) = (0.0, 0.0);
                 for (weight, left, moved) in &rows {
                     let (own, with) = (sigma * sigma * moved.norm_squared(), sigma * moved.dot(left));
@@ -186,8 +187,8 @@ impl<'a> Left<'a> {
             })
             .collect();
         let top = values.iter().map(|(value, _)| *value).fold(f64::NEG_INFINITY, f64::max);
-        let mean = values.iter().map(|(value, _)| libm::exp(value - top)).sum::<f64>() / f64::from(STEPS);
-        let sigma = values.iter().find(|(value, _)| *value == top).map_or(SMALLEST, |(_, sigma)| *sigma);
+        let mean = values.iter().map(|(value, _)| libm::exp(value - top)).sum::<f64>() / f64::from(settings.steps);
+        let sigma = values.iter().find(|(value, _)| *value == top).map_or(settings.smallest, |(_, sigma)| *sigma);
         (top + libm::log(mean), Scatter { joint, sigma, log_odds: 0.0 })
     }
 

@@ -10,15 +10,6 @@ use super::evidence::{Evidence, Extension};
 use crate::effects::{Kind, Location};
 use crate::seed::stream;
 
-/// Rounds of the walk: in each, every cause is drawn anew once.
-const ROUNDS: usize = 16;
-/// Probability from which on a cause needs no more rounds.
-const CERTAIN: f64 = 0.995;
-/// Places for causes that are not in the likeliest set.
-const SPARE: usize = 1;
-/// Additions whose posterior is computed exactly: how signs shift beside a new member is left out at first.
-const EXACT: usize = 6;
-
 /// What is claimed: a kind (or none) at a place.
 pub type Claim = (Option<Kind>, Location);
 
@@ -93,7 +84,7 @@ pub fn climb(evidence: &Evidence<'_>, start: &[(usize, usize)], most: usize) -> 
 fn best_addition(evidence: &Evidence<'_>, members: &[(usize, usize)]) -> Option<((usize, usize), f64)> {
     let mut found = evidence.extensions(members);
     found.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior).then(a.member.cmp(&b.member)));
-    let exact = found.iter().take(EXACT).map(|extension| {
+    let exact = found.iter().take(evidence.settings.search.exact).map(|extension| {
         let with: Vec<(usize, usize)> = members.iter().copied().chain([extension.member]).collect();
         (extension.member, evidence.log_posterior(&with))
     });
@@ -122,11 +113,11 @@ fn add(weights: &mut Weights, claim: Claim, probability: f64, hypothesis: usize)
 fn walk(evidence: &Evidence<'_>, best: &[(usize, usize)], most: usize) -> Found {
     let mut stream = stream(1, "diagnosis/walk");
     let mut places: Vec<Option<(usize, usize)>> = best.iter().copied().map(Some).collect();
-    places.extend(vec![None; SPARE.min(most.saturating_sub(best.len()))]);
+    places.extend(vec![None; evidence.settings.search.spare.min(most.saturating_sub(best.len()))]);
     let mut of_place: Vec<Weights> = vec![Weights::new(); places.len()];
     let mut all: Weights = Weights::new();
     let mut rounds = 0;
-    for round in 0..ROUNDS {
+    for round in 0..evidence.settings.search.rounds {
         let mut of_round: Weights = Weights::new();
         let mut certain = true;
         for place in 0..places.len() {
@@ -153,7 +144,8 @@ fn walk(evidence: &Evidence<'_>, best: &[(usize, usize)], most: usize) -> Found 
                 }
             }
             places[place] = next;
-            certain &= here.values().map(|(probability, ..)| *probability).fold(nothing / total, f64::max) > CERTAIN;
+            certain &= here.values().map(|(probability, ..)| *probability).fold(nothing / total, f64::max)
+                > evidence.settings.search.certain;
             for (claim, (probability, _, hypothesis)) in here {
                 add(&mut of_place[place], claim, probability, hypothesis);
                 add(&mut of_round, claim, probability, hypothesis);

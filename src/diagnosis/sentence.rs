@@ -1,6 +1,5 @@
 //! The verdict in a sentence, and the words that it is made of.
 
-use super::claims::SURE;
 use super::detectability::Detectability;
 use super::outcome::{Candidate, Effect, Gap, NoiseSource, Place, Unknown, Verdict};
 use crate::effects::{Kind, Level, Location};
@@ -13,6 +12,7 @@ pub(super) fn sentence(
     unknown: &Unknown,
     gap: &Gap,
     power: &Detectability,
+    sure: f64,
 ) -> String {
     let names = |effects: &[Effect]| {
         // Two ripples of one joint are one cause.
@@ -56,7 +56,7 @@ pub(super) fn sentence(
             if names(effects).len() > 1 {
                 format!(
                     "Several causes, not all settled (below {:.0} %): {}; held-out RMS {} with geometry, {} with the causes.",
-                    100.0 * SURE,
+                    100.0 * sure,
                     list(effects),
                     um(gap.geometry_rms_m),
                     um(gap.explained_rms_m)

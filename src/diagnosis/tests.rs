@@ -95,7 +95,7 @@ fn readings(label: &str, off: impl Fn(&Arm, &[f64], &[i8], usize, f64) -> f64) -
 
 fn diagnosed(arm: &Arm, rows: &[Measurement], without: Vec<Kind>) -> Diagnosis {
     let rows: Vec<&Measurement> = rows.iter().collect();
-    diagnose(arm, &sensor(), &rows, &Options { noise: NoiseSource::Declared, without, only: None }).unwrap()
+    diagnose(arm, &sensor(), &rows, &Options { without, ..Options::new(NoiseSource::Declared) }).unwrap()
 }
 
 #[test]
@@ -178,7 +178,7 @@ fn orientations_that_are_better_than_said_are_no_effect() {
     let (arm, rows) = readings("test/attitudes", |_, _, _, _, _| 0.0);
     let sensor = Sensor { orientation_sigma_rad: Some(4.5 * ORIENTATION_SIGMA), ..sensor() };
     let rows: Vec<&Measurement> = rows.iter().collect();
-    let options = Options { noise: NoiseSource::Declared, without: Vec::new(), only: None };
+    let options = Options { without: Vec::new(), ..Options::new(NoiseSource::Declared) };
     let found = diagnose(&arm, &sensor, &rows, &options).unwrap();
     assert!(found.effects.is_empty() && !found.unknown.present, "{}", found.sentence);
     let sigma = found.noise_floor.rotation_rad.unwrap();
@@ -343,7 +343,7 @@ fn a_fold_uses_what_helped_the_others() {
     };
     let with = |squares: &[[f64; 3]]| -> Vec<usize> {
         let folds: Vec<Fold> = squares.iter().map(|squares| fold(*squares)).collect();
-        (0..folds.len()).map(|number| used(&folds, number)).collect()
+        (0..folds.len()).map(|number| used(&folds, number, &super::settings::Validation::default())).collect()
     };
     // Both help everywhere.
     assert_eq!(with(&[[9.0, 5.0, 4.0], [8.0, 4.0, 3.0], [9.0, 6.0, 5.0], [7.0, 4.0, 2.0]]), [2; 4]);
@@ -387,7 +387,7 @@ fn what_survives_of_the_geometry_is_that_of_the_whole_system() {
     let (options, sensor) = (Options::new(NoiseSource::Declared), sensor());
     let data = super::Data::new(&arm, &sensor, &rows, &options);
     let state = super::State { scale: 0.3, ..super::State::nominal(&data) };
-    let pass = super::Pass::new(&data, &state, super::PASSES).unwrap();
+    let pass = super::Pass::new(&data, &state, options.settings.model.passes).unwrap();
     let linear = pass.linear();
     let out = 1;
     let marginal = super::Marginal::new(&pass.products, Some(out), &linear.prior).unwrap();
@@ -432,7 +432,8 @@ fn what_survives_of_the_geometry_is_that_of_the_whole_system() {
     let change = normal.solve(&(jacobian.transpose() * (rest.column(last) - effects)));
     assert!((marginal.geometry(&coefficients) - &change).norm() < 1e-8 * change.norm().max(1.0));
     // An effect more is worth what the pair is.
-    let evidence = super::Evidence { marginal: &marginal, candidates: &pass.candidates, noise: data.noise };
+    let evidence =
+        super::Evidence { marginal: &marginal, candidates: &pass.candidates, noise: data.noise, settings: &options.settings };
     for extension in evidence
         .extensions(&chosen[..1])
         .iter()

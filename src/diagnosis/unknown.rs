@@ -1,14 +1,8 @@
 //! Whether something is left that no effect of the library explains.
 
 use super::Analysis;
-use super::claims::NAMED;
 use super::outcome::{NoiseFloor, NoiseSource, Unknown};
 use super::sentence::whose;
-
-/// Of the residual having no structure: below this there is some.
-const STRUCTURED: f64 = 0.003;
-/// Mean square of the residual, over that of the noise that is known, from which on something is left.
-const EXCESS: f64 = 2.4;
 
 /// What is unknown: shapes without a name, structure, or too much. `level`: mean square of the residual over the declared one.
 pub(super) fn unknown(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFloor) -> Unknown {
@@ -19,14 +13,15 @@ pub(super) fn unknown(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFl
         .filter(|belief| belief.claim.0.is_none())
         .map(|belief| belief.probability)
         .fold(0.0, f64::max);
+    let decision = &analysis.options.settings.decision;
     let p_value = analysis.structure.p_value;
-    let structured = p_value < STRUCTURED;
+    let structured = p_value < decision.structured;
     // A sensor may be somewhat worse than it says, not this much.
     let known = !matches!(noise_floor.source, NoiseSource::Assumed);
     let over = noise_floor.position_m / analysis.sigma_m();
-    let excess = known && level > EXCESS * over * over;
+    let excess = known && level > decision.excess * over * over;
     let scatters = !analysis.scatter.is_empty();
-    let present = of_nameless >= NAMED || structured || excess || scatters;
+    let present = of_nameless >= decision.named || structured || excess || scatters;
     let r#where = present.then(|| {
         let members = analysis.found.best.iter().map(|(hypothesis, _)| &analysis.evidence.candidates.hypotheses[*hypothesis]);
         let mut said: Vec<String> = members.filter(|of| of.kind.is_none()).map(|of| of.detail.clone()).collect();

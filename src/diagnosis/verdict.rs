@@ -2,7 +2,6 @@
 
 use super::Analysis;
 use super::advice::next;
-use super::claims::{NAMED, SURE};
 use super::confusion::confusion;
 use super::detectability::detectability;
 use super::gap::Closing;
@@ -10,14 +9,13 @@ use super::naming::name;
 use super::notes::notes;
 use super::outcome::{Candidate, Diagnosis, Effect, NoiseFloor, NoiseSource, Residual, Unknown, Verdict};
 use super::sentence::sentence;
+use super::settings::Decision;
 use super::unknown::unknown;
 use crate::effects::Kind;
 
-/// Of the kinds and places, so many must be detectable at a realistic magnitude for "no gap".
-const ENOUGH: f64 = 0.5;
-
 /// Puts the analysis into words and numbers.
 pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
+    let settings = &analysis.options.settings.decision;
     let noise_floor = noise_floor(analysis);
     let level = analysis.evidence.noise_level(&analysis.found.best);
     let closing = Closing::new(analysis, noise_floor.position_m);
@@ -27,15 +25,16 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
     let confusion_sets = confusion(analysis);
     let power = detectability(analysis, level);
     let notes = notes(analysis, level, &noise_floor, &gap);
-    let verdict = decide(&unknown, &named.effects, &confusion_sets, power.share);
+    let verdict = decide(&unknown, &named.effects, &confusion_sets, power.share, settings);
     Diagnosis {
         verdict,
-        sentence: sentence(verdict, &named.effects, &confusion_sets, &unknown, &gap, &power),
+        sentence: sentence(verdict, &named.effects, &confusion_sets, &unknown, &gap, &power, settings.sure),
         gap,
         unknown,
         maps: analysis.maps.clone(),
         next_measurements: next(analysis, &confusion_sets, &power, verdict),
         notes,
+        settings: analysis.options.settings.clone(),
         readings: analysis.measurements.len(),
         residuals: residuals(analysis, &named.of_member),
         noise_floor,
@@ -63,11 +62,11 @@ fn noise_floor(analysis: &Analysis<'_>) -> NoiseFloor {
 }
 
 /// `share`: of the kinds and places that would have shown.
-fn decide(unknown: &Unknown, effects: &[Effect], sets: &[Vec<Candidate>], share: f64) -> Verdict {
+fn decide(unknown: &Unknown, effects: &[Effect], sets: &[Vec<Candidate>], share: f64, settings: &Decision) -> Verdict {
     // Sure, and the same for half of the folds at least.
-    let settled = |effect: &&Effect| effect.probability >= SURE && 2 * effect.folds[0] >= effect.folds[1];
+    let settled = |effect: &&Effect| effect.probability >= settings.sure && 2 * effect.folds[0] >= effect.folds[1];
     let named: Vec<&Effect> = effects.iter().filter(|effect| effect.kind != Kind::MeasurementOutliers).collect();
-    let open = sets.iter().any(|set| set.iter().map(|candidate| candidate.probability).sum::<f64>() >= NAMED);
+    let open = sets.iter().any(|set| set.iter().map(|candidate| candidate.probability).sum::<f64>() >= settings.named);
     if unknown.present {
         Verdict::UnknownRemains
     } else if !named.is_empty() && named.iter().all(settled) {
@@ -76,7 +75,7 @@ fn decide(unknown: &Unknown, effects: &[Effect], sets: &[Vec<Candidate>], share:
         Verdict::Ambiguous
     } else if !effects.is_empty() {
         Verdict::Explained
-    } else if share >= ENOUGH {
+    } else if share >= settings.detectable {
         Verdict::NoGap
     } else {
         Verdict::NotDetectable

@@ -2,15 +2,17 @@
 //! ([`Waterfall::displacements`]), or told by somebody else, such as a simulation.
 
 use super::conditions::{self, Conditions};
-use super::deflection::Loads;
+use super::deflection::{Loads, Present, deflected};
 use super::groups::groups;
 use super::held_out::{self, Scheme};
 use super::outcome::Effect;
 use super::outliers;
 use super::rows::{self, DiagnosisError, Readings, Rows};
+use super::settings::Settings;
 use super::weights;
 use crate::arm::Arm;
-use crate::effects::signature::shape::Displacement;
+use crate::effects::Location;
+use crate::effects::signature::shape::{Displacement, Reading};
 use crate::measurement::{Measurement, Sensor};
 
 /// Rounds of fitting geometry beside the effects, and of weighting readings.
@@ -30,6 +32,7 @@ pub struct Waterfall<'a> {
     scheme: Scheme,
     weights: Vec<f64>,
     good: Vec<bool>,
+    settings: &'a Settings,
 }
 
 impl<'a> Waterfall<'a> {
@@ -43,36 +46,55 @@ impl<'a> Waterfall<'a> {
         sensor: &'a Sensor,
         measurements: &'a [&'a Measurement],
         effects: &[Effect],
+        settings: &'a Settings,
     ) -> Result<Self, DiagnosisError> {
         let total = measurements.len();
-        let groups = groups(measurements);
+        let groups = groups(measurements, &settings.noise);
         let start = vec![1.0; total];
-        let rows = rows::fit(arm, Readings { sensor, measurements, weights: &start, displacement: &[], scatter: &[] })?;
-        let (conditions, _) = conditions::conditions(measurements, &rows, &[], Loads::AsItStands);
-        let scheme = held_out::schemes(measurements, &rows.targets, &groups).swap_remove(0);
+        let rows =
+            rows::fit(arm, Readings { sensor, measurements, weights: &start, displacement: &[], scatter: &[] }, &settings.model)?;
+        let (conditions, _) = conditions::conditions(measurements, &rows, &[], Loads::AsItStands, &settings.model);
+        let scheme = held_out::schemes(measurements, &rows.targets, &groups, settings.validation.folds).swap_remove(0);
         let good = vec![true; total];
-        let mut waterfall = Waterfall { arm, sensor, measurements, rows, conditions, scheme, weights: start, good };
+        let mut waterfall = Waterfall { arm, sensor, measurements, rows, conditions, scheme, weights: start, good, settings };
         for _ in 0..PASSES {
-            let displacement = waterfall.all(effects);
+            let displacement = waterfall.together(effects);
             let weights = &waterfall.weights;
-            let rows = rows::fit(arm, Readings { sensor, measurements, weights, displacement: &displacement, scatter: &[] })?;
-            let weighed = weights::weigh(&rows, &rows.residual, weights, &groups);
-            let outliers = outliers::look(&weighed.squares, &rows.equations.counts()).rows;
+            let rows = rows::fit(
+                arm,
+                Readings { sensor, measurements, weights, displacement: &displacement, scatter: &[] },
+                &settings.model,
+            )?;
+            let weighed = weights::weigh(&rows, &rows.residual, weights, &groups, &settings.noise);
+            let outliers = outliers::look(&weighed.squares, &rows.equations.counts(), &settings.outliers).rows;
             waterfall.good = (0..total).map(|row| !outliers.contains(&row)).collect();
             waterfall.weights = weighed.far.iter().zip(&weighed.dependent).map(|(a, b)| a * b).collect();
-            waterfall.conditions = conditions::conditions(measurements, &rows, &[], Loads::AsItStands).0;
+            waterfall.conditions = conditions::conditions(measurements, &rows, &[], Loads::AsItStands, &settings.model).0;
             waterfall.rows = rows;
         }
         Ok(waterfall)
     }
 
-    /// What all of `effects` that have a formula do together.
-    fn all(&self, effects: &[Effect]) -> Vec<Displacement> {
-        let nothing = vec![[0.0; 6]; self.measurements.len()];
-        effects
-            .iter()
-            .filter_map(|effect| self.displacements(effect))
-            .fold(nothing, |sum, one| sum.iter().zip(&one).map(|(a, b)| std::array::from_fn(|axis| a[axis] + b[axis])).collect())
+    /// What all of `effects` that have a formula do together (of each reading: shift of the target in m, turn in rad, in root), as large as
+    /// they are: loads are those of the arm as it stands with them.
+    #[must_use]
+    pub fn together(&self, effects: &[Effect]) -> Vec<Displacement> {
+        let present = |reading: &Reading| -> Vec<Present> {
+            let known = effects.iter().filter_map(|effect| {
+                let signature = effect.signature.as_ref().filter(|signature| signature.shape.can_be_read(reading))?;
+                Some(Present {
+                    location: Location { level: effect.location.level, index: effect.location.index },
+                    shape: signature.shape,
+                    coefficients: signature.coefficients.clone(),
+                })
+            });
+            known.collect()
+        };
+        let of = |(reading, row): (&Reading, &&Measurement)| {
+            let payload_kg = row.payload_kg.unwrap_or(0.0);
+            deflected(&self.rows, reading, payload_kg, &present(reading), Loads::AsItStands).displacement
+        };
+        self.conditions.readings.iter().zip(self.measurements).map(of).collect()
     }
 
     /// What `effect` does to the target in each reading (shift in m, turn in rad, in root), to first order: the columns of what it was
@@ -102,6 +124,7 @@ impl<'a> Waterfall<'a> {
                 let fitted = rows::fit(
                     self.arm,
                     Readings { sensor, measurements, weights: &weights, displacement: displacements, scatter: &[] },
+                    &self.settings.model,
                 )?;
                 let counted: Vec<usize> = (0..measurements.len()).filter(|row| held(row) && self.good[*row]).collect();
                 let square = |row: &usize| fitted.residual.rows_range(fitted.equations.of_position(*row)).norm_squared();

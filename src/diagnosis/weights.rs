@@ -7,6 +7,7 @@ use nalgebra::DVector;
 use super::groups::{self, Groups, Repeats};
 use super::outliers;
 use super::rows::Rows;
+use super::settings::Noise;
 use crate::measurement::Sensor;
 
 /// Weights of readings, and what they come from.
@@ -22,7 +23,7 @@ pub(super) struct Weighed {
 }
 
 /// Weighs the rows by what a model leaves of them (`residual`, m and rad). `before`: the weights that are in `rows.whitening`.
-pub(super) fn weigh(rows: &Rows, residual: &DVector<f64>, before: &[f64], groups: &Groups) -> Weighed {
+pub(super) fn weigh(rows: &Rows, residual: &DVector<f64>, before: &[f64], groups: &Groups, settings: &Noise) -> Weighed {
     // In declared sigmas, whatever a row's weight.
     let whitened = rows.whitening.of_vector(residual);
     let equations = &rows.equations;
@@ -32,31 +33,30 @@ pub(super) fn weigh(rows: &Rows, residual: &DVector<f64>, before: &[f64], groups
         (0..before.len()).map(|row| sigmas[equations.of(row)].iter().map(|value| value * value).sum::<f64>()).collect();
     let far = outliers::weights(&squares, &equations.counts());
     let near: Vec<bool> = far.iter().map(|weight| *weight > 0.5).collect();
-    let (dependent, correlation) = groups::weights(groups, &sigmas, equations, &near);
+    let (dependent, correlation) = groups::weights(groups, &sigmas, equations, &near, settings);
     Weighed { squares, far, dependent, correlation }
 }
 
-/// Degrees of freedom of repeats from which on they tell the orientations' noise.
-const ENOUGH: f64 = 36.0;
-/// Mean square, over what is said of the noise, beyond which what is left is no noise.
-const NO_NOISE: f64 = 9.0;
-/// Beyond chance, a difference of the logarithms of the sigmas that matters.
-const MATTERS: f64 = 0.1;
-
 /// The noise of orientations beside that of positions, over what is said of both; one where the difference is chance or next to nothing. None
 /// where there are not enough repeats.
-pub(super) fn orientation_of_repeats(sensor: &Sensor, repeats: Option<Repeats>, position_m: f64) -> Option<f64> {
-    let repeats = repeats.filter(|repeats| repeats.degrees_of_freedom >= ENOUGH)?;
+pub(super) fn orientation_of_repeats(
+    sensor: &Sensor,
+    repeats: Option<Repeats>,
+    position_m: f64,
+    settings: &Noise,
+) -> Option<f64> {
+    let repeats = repeats.filter(|repeats| repeats.degrees_of_freedom >= settings.orientation_degrees)?;
     let (found, said) = (repeats.orientation_rad? / repeats.position_m, sensor.orientation_sigma_rad? / position_m);
     let log = libm::log(found / said);
-    let differs = log.abs() > MATTERS + 3.0 * libm::sqrt(1.0 / repeats.degrees_of_freedom);
+    let differs =
+        log.abs() > settings.log_sigma_matters + settings.standard_errors * libm::sqrt(1.0 / repeats.degrees_of_freedom);
     (found > 0.0 && said > 0.0).then(|| if differs { libm::exp(log) } else { 1.0 })
 }
 
 /// How much larger than that of the positions what is left of the orientations is, both in the sensor's sigmas, where that is neither chance
 /// nor next to nothing: one of them is not what it is said to be (estimation of variance components, Helmert 1907, here by medians). None
 /// where so much is left that it is not noise. `known`: that it is not as said is known already, and by how much is asked.
-pub(super) fn orientation_over_position(rows: &Rows, residual: &DVector<f64>, known: bool) -> Option<f64> {
+pub(super) fn orientation_over_position(rows: &Rows, residual: &DVector<f64>, known: bool, settings: &Noise) -> Option<f64> {
     let equations = &rows.equations;
     if !equations.has_orientation() {
         return None;
@@ -75,12 +75,12 @@ pub(super) fn orientation_over_position(rows: &Rows, residual: &DVector<f64>, kn
     };
     let position = level(&|row| equations.of_position(row));
     let orientation = level(&|row| equations.of_position(row).end..equations.of(row).end);
-    if position <= 0.0 || orientation <= 0.0 || position.min(orientation) > NO_NOISE {
+    if position <= 0.0 || orientation <= 0.0 || position.min(orientation) > settings.no_noise {
         return None;
     }
     let log = 0.5 * libm::log(orientation / position);
     // A median of squares of three equations tells sigma as well as three fifths of the readings would; rows that count less, less.
     let readings: f64 = counts.iter().map(|row| rows.whitening.weights()[*row]).sum();
     let deviation = if known { 0.0 } else { libm::sqrt(2.0 / (6.0 * 0.6 * readings)) };
-    (log.abs() > MATTERS + 3.0 * deviation).then(|| libm::exp(log))
+    (log.abs() > settings.log_sigma_matters + settings.standard_errors * deviation).then(|| libm::exp(log))
 }

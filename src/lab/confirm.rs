@@ -136,7 +136,7 @@ pub fn confirm(
     if diagnosis.effects.is_empty() {
         return Ok(confirmation);
     }
-    let waterfall = Waterfall::new(arm, sensor, measurements, &diagnosis.effects)?;
+    let waterfall = Waterfall::new(arm, sensor, measurements, &diagnosis.effects, &diagnosis.settings)?;
     let simulator = Simulator::new(arm, &waterfall, measurements);
     let nothing = vec![[0.0; 6]; measurements.len()];
 
@@ -631,7 +631,8 @@ mod tests {
         const ROWS: usize = 40;
         let (scene, rows) = readings(Vec::new(), ROWS);
         let rows: Vec<&Measurement> = rows.iter().collect();
-        let waterfall = Waterfall::new(&scene.arm, &scene.sensor, &rows, &[]).unwrap();
+        let settings = crate::diagnosis::settings::Settings::default();
+        let waterfall = Waterfall::new(&scene.arm, &scene.sensor, &rows, &[], &settings).unwrap();
         let simulator = Simulator::new(&scene.arm, &waterfall, &rows);
         let still = simulator.run(&[]).unwrap();
         let readings = &waterfall.conditions.readings;
@@ -686,7 +687,8 @@ mod tests {
     fn without_effects_the_simulated_arm_is_the_fitted_one() {
         let (scene, rows) = readings(Vec::new(), 40);
         let rows: Vec<&Measurement> = rows.iter().collect();
-        let waterfall = Waterfall::new(&scene.arm, &scene.sensor, &rows, &[]).unwrap();
+        let settings = crate::diagnosis::settings::Settings::default();
+        let waterfall = Waterfall::new(&scene.arm, &scene.sensor, &rows, &[], &settings).unwrap();
         let simulator = Simulator::new(&scene.arm, &waterfall, &rows);
         let ran = simulator.run(&[]).unwrap();
         for ((pose, in_tool), target) in ran.poses.iter().zip(&simulator.targets).zip(&waterfall.rows.targets) {
@@ -733,7 +735,8 @@ mod tests {
         let (scene, rows) = readings(Vec::new(), 40);
         let rows: Vec<&Measurement> = rows.iter().collect();
         let effect = named(&of(Kind::TiltClearance, Shape::MomentAcrossSign { joint: 1, held: 0.0 }, Some(2)), &[2e-4], 40);
-        let waterfall = Waterfall::new(&scene.arm, &scene.sensor, &rows, &[]).unwrap();
+        let settings = crate::diagnosis::settings::Settings::default();
+        let waterfall = Waterfall::new(&scene.arm, &scene.sensor, &rows, &[], &settings).unwrap();
         let simulator = Simulator::new(&scene.arm, &waterfall, &rows);
         let ran = simulator.run(&[Effect::Clearance { joint: 1, radial: 0.0, axial: 0.0, tilt: 2e-4, held: None }]).unwrap();
         let moved = simulator.displacements(&ran.poses, &simulator.run(&[]).unwrap().poses);

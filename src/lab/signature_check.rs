@@ -8,6 +8,7 @@ use super::injection::places;
 use crate::diagnosis::conditions::conditions;
 use crate::diagnosis::deflection::Loads;
 use crate::diagnosis::rows::{Readings, fit};
+use crate::diagnosis::settings::Model;
 use crate::effects::Kind;
 use crate::effects::signature::library::library;
 use crate::effects::signature::posture::Mechanism;
@@ -50,9 +51,10 @@ fn every_signature_is_what_physics_makes() {
     let fitted = fit(
         &scene.arm,
         Readings { sensor: &scene.sensor, measurements: &rows, weights: &vec![1.0; rows.len()], displacement: &[], scatter: &[] },
+        &Model::default(),
     )
     .unwrap();
-    let known = conditions(&rows, &fitted, &[], Loads::AsItStands).0;
+    let known = conditions(&rows, &fitted, &[], Loads::AsItStands, &Model::default()).0;
     let library = library(&Mechanism::new(&scene.arm), &known.columns);
     for kind in Kind::known() {
         for place in places(kind, &scene.arm) {

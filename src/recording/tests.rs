@@ -278,6 +278,7 @@ fn diagnosis(stream: &mut Stream, readings: usize) -> Diagnosis {
         reason: reason.to_owned(),
     };
     Diagnosis {
+        settings: Default::default(),
         verdict: Verdict::Ambiguous,
         sentence: "Something is there.".to_owned(),
         noise_floor: NoiseFloor { position_m: 1e-5 / 3.0, rotation_rad: None, source: NoiseSource::Declared },

@@ -81,6 +81,7 @@ pub(super) fn scene(file: &SceneToml) -> Checked<Scene> {
         sensor,
         design,
         plan,
+        diagnosis: file.diagnosis.clone(),
         weights,
     })
 }

@@ -11,6 +11,7 @@ use serde::de::{self, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::design::problem::{Criterion, Method};
+use crate::diagnosis::settings::Settings;
 use crate::simulation::effect::Moves;
 use crate::simulation::plan::ApproachPolicy;
 
@@ -36,9 +37,16 @@ pub struct SceneToml {
     pub identification: IdentificationToml,
     /// `[plan]`
     pub plan: PlanToml,
+    /// `[diagnosis]`: numbers that decide what a diagnosis says, where they are not as usual.
+    #[serde(default, skip_serializing_if = "is_usual")]
+    pub diagnosis: Settings,
     /// `[injected]`: what the simulated cell hides from the analyser. Absent where the scene is public.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub injected: Option<InjectedToml>,
+}
+
+fn is_usual(settings: &Settings) -> bool {
+    *settings == Settings::default()
 }
 
 /// A file that holds nothing but `[injected]`.

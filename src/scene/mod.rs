@@ -15,6 +15,7 @@ pub use reader::{SceneFile, parse, parse_injected, read};
 
 use crate::arm::Arm;
 use crate::design::problem::{DesignProblem, Request};
+use crate::diagnosis::settings::Settings;
 use crate::measurement::{Sensor, Weights};
 #[cfg(feature = "simulator")]
 use crate::simulation::cell::Cell;
@@ -45,6 +46,8 @@ pub struct Scene {
     pub plan: Plan,
     /// How the residuals are weighted.
     pub weights: Weights,
+    /// Every number that decides what a diagnosis says.
+    pub diagnosis: Settings,
 }
 
 impl Scene {
