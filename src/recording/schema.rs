@@ -7,11 +7,12 @@ use serde_json::{Map, Value, json};
 
 use super::json::{CANDIDATES, SETS};
 
-/// The only field of a recorded configuration.
-const JOINTS: &str = "joints";
+/// The only field of a recorded configuration, and what it is.
+const JOINTS: (&str, &str) = ("joints", "Joint coordinates from the base outwards, rad (m for prismatic joints).");
 
 /// What stands in recordings as arrays of objects where the types have arrays of arrays, and the objects' only field.
-const NESTED: [(&str, &str); 3] = [("configurations", JOINTS), ("best_configurations", JOINTS), (SETS, CANDIDATES)];
+const NESTED: [(&str, (&str, &str)); 3] =
+    [("configurations", JOINTS), ("best_configurations", JOINTS), (SETS, (CANDIDATES, "Its hypotheses."))];
 
 /// Schema of `T` as `--json` writes it, without references; what may be null is said to.
 #[must_use]
@@ -54,10 +55,11 @@ fn for_viewers(schema: &mut Schema) {
         if without_null(property) {
             nullable.push(Value::from(name.as_str()));
         }
-        if let Some((_, field)) = NESTED.iter().find(|(array, _)| array == name) {
-            let inner = property.remove("items").unwrap_or_default();
-            property
-                .insert("items".to_owned(), json!({ "type": "object", "required": [field], "properties": { *field: inner } }));
+        if let Some((_, (field, description))) = NESTED.iter().find(|(array, _)| array == name) {
+            let mut inner = property.remove("items").unwrap_or_default();
+            inner["description"] = (*description).into();
+            let outer = json!({ "type": "object", "required": [field], "properties": { *field: inner } });
+            property.insert("items".to_owned(), outer);
         }
     }
     if let Some(required) = schema.get_mut("required").and_then(Value::as_array_mut) {
