@@ -204,16 +204,6 @@ fn too_few_readings_are_refused_and_swapped_joints_are_said() {
 }
 
 #[test]
-fn a_fold_less_is_a_subtraction() {
-    let mut stream = stream(3, "test/gram");
-    let matrix = DMatrix::from_fn(30, 6, |_, _| stream.normal());
-    let all = Gram::new(&matrix, 2);
-    let part = Gram::new(&matrix.rows(0, 12).into_owned(), 2);
-    let rest = Gram::new(&matrix.rows(12, 18).into_owned(), 2);
-    assert!((all.without(&part).products - rest.products).norm() < 1e-12);
-}
-
-#[test]
 fn what_is_said_is_as_the_schema_has_it() {
     let schema = json_schema::<Diagnosis>("kincal diagnose --json");
     let (arm, rows) =

@@ -267,14 +267,14 @@ fn every_value_has_its_mark() {
     let cells = Kind::Cells { values: vec![vec![1.0, 2.5], vec![f64::NAN]], digits: 3, shade: Shade::Table };
     assert_eq!(marks(cells.clone(), "<polygon"), 4);
     let text = Figure::new("", 1).with(Panel::default().with(Series::new("", cells))).svg().unwrap();
-    assert!(text.contains(">2.50</text>") && text.contains(">1.00</text>") && count(&text, ">–</text>") == 2);
+    assert!(text.contains("\n2.50\n") && text.contains("\n1.00\n") && count(&text, "\n–\n") == 2);
 }
 
 #[test]
 fn the_legend_names_every_labelled_series() {
     let text = errors_by_count().svg().unwrap();
     for label in ["optimal set, 95 %", "random sets, 95 %", "paper", "bound σ/√n", "position error (mm)"] {
-        assert_eq!(count(&text, &format!(">{label}</text>")), 2, "{label}");
+        assert_eq!(count(&text, &format!("\n{label}\n")), 2, "{label}");
     }
 }
 

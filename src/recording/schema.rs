@@ -49,6 +49,7 @@ fn tidy(schema: &mut Schema) {
 
 fn for_viewers(schema: &mut Schema) {
     let Some(schema) = schema.as_object_mut() else { return };
+    one_alternative(schema);
     let mut nullable = Vec::new();
     for (name, property) in schema.get_mut("properties").and_then(Value::as_object_mut).into_iter().flatten() {
         let Some(property) = property.as_object_mut() else { continue };
@@ -65,7 +66,6 @@ fn for_viewers(schema: &mut Schema) {
     if let Some(required) = schema.get_mut("required").and_then(Value::as_array_mut) {
         required.retain(|name| !nullable.contains(name));
     }
-    one_alternative(schema);
 }
 
 /// Takes null out of what a property may be; whether it was there.
@@ -99,24 +99,43 @@ fn without_null(property: &mut Map<String, Value>) -> bool {
     found
 }
 
-/// Alternatives become one: values of an enumeration a list of them, with their descriptions as part of its own; objects an object with
-/// the members of all, of which those are required that all have.
+/// Alternatives become one: values of an enumeration a list of them; objects an object with the members of all, of which those are
+/// required that all have. What each alternative means stands in the description.
 fn one_alternative(schema: &mut Map<String, Value>) {
     let Some(Value::Array(choices)) = schema.remove("oneOf") else { return };
     let mut merged = Map::new();
-    let mut description = schema.get("description").and_then(Value::as_str).unwrap_or_default().to_owned();
     for choice in choices {
         let Value::Object(mut choice) = choice else { continue };
-        if let (Some(Value::String(value)), Some(Value::String(meant))) = (choice.get("const"), choice.get("description")) {
-            description = format!("{description} {value}: {meant}");
-        }
-        choice.remove("description");
+        named(&mut choice);
         merge(&mut merged, choice);
     }
-    if !description.is_empty() {
-        schema.insert("description".to_owned(), description.trim().into());
-    }
+    let required = merged.remove("required");
     merge(schema, merged);
+    if let Some(Value::Array(more)) = required {
+        match schema.get_mut("required") {
+            Some(Value::Array(known)) => known.extend(more),
+            _ => {
+                schema.insert("required".to_owned(), more.into());
+            }
+        }
+    }
+}
+
+/// Puts the name of an alternative before what it means, where the name is.
+fn named(choice: &mut Map<String, Value>) {
+    let Some(Value::String(meant)) = choice.remove("description") else { return };
+    let name = |of: &Map<String, Value>| of.get("const").and_then(Value::as_str).map(|name| format!("{name}: {meant}"));
+    if let Some(text) = name(choice) {
+        choice.insert("description".to_owned(), text.into());
+    }
+    for property in choice.get_mut("properties").and_then(Value::as_object_mut).into_iter().flat_map(Map::values_mut) {
+        let Some(property) = property.as_object_mut() else { continue };
+        if let Some(text) = name(property) {
+            property.insert("description".to_owned(), text.into());
+        }
+        // The member that an alternative with content is written as.
+        property.entry("description").or_insert_with(|| meant.as_str().into());
+    }
 }
 
 /// Takes what an alternative allows into `all`.
@@ -124,6 +143,13 @@ fn merge(all: &mut Map<String, Value>, choice: Map<String, Value>) {
     for (key, value) in choice {
         match (key.as_str(), value) {
             ("const", value) => merge_values(all, vec![value]),
+            ("description", Value::String(more)) => match all.get_mut("description") {
+                Some(Value::String(known)) if known.contains(&more) => {}
+                Some(Value::String(known)) => *known = format!("{known} {more}"),
+                _ => {
+                    all.insert(key, more.into());
+                }
+            },
             ("enum", Value::Array(values)) => merge_values(all, values),
             ("properties", Value::Object(properties)) => {
                 let known = all.entry("properties").or_insert_with(|| Map::new().into());

@@ -344,7 +344,7 @@ pub enum Family {
 }
 
 /// How something goes with the share of the session that has passed.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Course {
     /// From 0 to 1 about a moment, along a raised cosine that is so wide.
