@@ -28,8 +28,18 @@ pub enum Event {
     Note(String),
 }
 
-/// What a recording begins with.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+/// The measurements among `events`, in their order.
+#[must_use]
+pub fn measurements(events: &[Event]) -> Vec<Measurement> {
+    let measured = |event: &Event| match event {
+        Event::Measured(measurement) => Some(measurement.clone()),
+        _ => None,
+    };
+    events.iter().filter_map(measured).collect()
+}
+
+/// What the run was: what a recording begins with.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 pub struct Start {
     /// Version of kincal.
     pub version: String,
@@ -47,7 +57,7 @@ pub struct Start {
 }
 
 /// What is known of a real cell besides its measurements.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 pub struct RealCell {
     /// Nominal robot as URDF; absent where it is the scene's.
     #[serde(default, skip_serializing_if = "Option::is_none")]

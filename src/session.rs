@@ -9,7 +9,7 @@ use crate::design::{self, DesignError};
 use crate::diagnosis::outcome::{Diagnosis, NoiseSource};
 use crate::diagnosis::rows::DiagnosisError;
 use crate::diagnosis::{self, Options};
-use crate::event::{Event, Listener, RealCell, Start};
+use crate::event::{Event, Listener, RealCell, Start, measurements};
 use crate::identification::alignment::{AlignmentError, align};
 use crate::identification::outcome::Identification;
 use crate::identification::{self, IdentificationError, identify};
@@ -328,13 +328,7 @@ pub fn replay(
                 (Some(injected), Subject::Scene(scene)) if measured.is_none() => {
                     let planned = match &chosen {
                         Some(chosen) => plan(&scene.cell(), chosen, &held_out(scene)?),
-                        None => {
-                            let rows = recorded.iter().filter_map(|event| match event {
-                                Event::Measured(measurement) => Some(measurement.clone()),
-                                _ => None,
-                            });
-                            as_measured(&scene.cell(), &rows.collect::<Vec<_>>())
-                        }
+                        None => as_measured(&scene.cell(), &measurements(recorded)),
                     };
                     // A recording that was cut off holds fewer poses than the session had.
                     let session = recorded.iter().find_map(|event| match event {

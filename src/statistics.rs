@@ -1,12 +1,13 @@
-//! What many trials say: means with their intervals, ratios, and rank correlations.
+//! What many trials say: means and shares with their intervals, medians, root mean squares, and rank correlations. One definition each.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use statrs::statistics::Statistics;
 
 use crate::numerics::distribution::student_quantile;
 
 /// A mean over trials.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Mean {
     /// Mean.
     pub mean: f64,
@@ -104,6 +105,48 @@ fn around(mean: f64, deviation: f64, count: usize) -> Option<[f64; 2]> {
     Some([mean - half, mean + half])
 }
 
+/// The value in the middle, or the mean of the two that are; `None` of no values.
+#[must_use]
+pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let mut sorted: Vec<f64> = values.into_iter().collect();
+    sorted.sort_by(f64::total_cmp);
+    let upper = *sorted.get(sorted.len() / 2)?;
+    Some(if sorted.len() % 2 == 1 { upper } else { 0.5 * (sorted[sorted.len() / 2 - 1] + upper) })
+}
+
+/// The value of a sample below which `share` (0 to 1) of the others are: that of the nearest rank, none between two. `None` of no values.
+#[must_use]
+pub fn nearest_rank(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
+    let mut sorted: Vec<f64> = values.into_iter().collect();
+    sorted.sort_by(f64::total_cmp);
+    let last = sorted.len().checked_sub(1)?;
+    Some(sorted[libm::round(share * last as f64) as usize])
+}
+
+/// Root of the mean of the squares; zero of no values.
+#[must_use]
+pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (squares, count) =
+        values.into_iter().fold((0.0, 0_usize), |(squares, count), value| (squares + value * value, count + 1));
+    libm::sqrt(squares / count.max(1) as f64)
+}
+
+/// 95 % interval of the share of `trials` that `of` of them were (Wilson 1927, without correction for continuity); from 0 to 1 of no
+/// trials.
+#[must_use]
+pub fn share_interval95(of: usize, trials: usize) -> [f64; 2] {
+    if trials == 0 {
+        return [0.0, 1.0];
+    }
+    let (n, p, z) = (trials as f64, of as f64 / trials as f64, NORMAL_975);
+    let middle = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
+    let half = z * libm::sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n)) / (1.0 + z * z / n);
+    [middle - half, middle + half]
+}
+
+/// Where the standard normal distribution has 97.5 % below it.
+pub const NORMAL_975: f64 = 1.959_963_984_540_054;
+
 /// Spearman's rank correlation of two samples; ties share their ranks. `None` where one of them does not vary, or there are fewer
 /// than three pairs.
 ///
@@ -181,6 +224,26 @@ mod tests {
         let gain = Mean::gain(&[0.5, 1.0, 2.0], &[1.0, 2.0, 4.0]).unwrap();
         assert_eq!((gain.mean, gain.interval95), (0.5, Some([0.5, 0.5])));
         assert!(Mean::gain(&[1.0], &[0.0]).is_none());
+    }
+
+    #[test]
+    fn intervals_of_shares_are_the_published_ones() {
+        // Newcombe, Statistics in Medicine 17 (1998) 857, table I, method 3.
+        for (of, trials, low, high) in
+            [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718)]
+        {
+            let found = share_interval95(of, trials);
+            assert!((found[0] - low).abs() < 5e-5 && (found[1] - high).abs() < 5e-5, "{of} of {trials}: {found:?}");
+        }
+        assert_eq!(share_interval95(0, 0), [0.0, 1.0]);
+    }
+
+    #[test]
+    fn middles_and_ends_of_samples() {
+        assert_eq!((median([3.0, 1.0, 2.0]), median([4.0, 1.0, 2.0, 3.0]), median([])), (Some(2.0), Some(2.5), None));
+        assert_eq!(nearest_rank((0..=200).rev().map(f64::from), 0.025), Some(5.0));
+        assert_eq!((nearest_rank([2.0], 0.975), nearest_rank([], 0.5)), (Some(2.0), None));
+        assert_eq!((rms([3.0, 4.0, 0.0, 0.0]), rms([])), (2.5, 0.0));
     }
 
     #[test]

@@ -9,15 +9,14 @@ use serde_json::json;
 
 use super::Outcome;
 use super::arguments::{Baseline, ChallengeCommand, Global, NewOptions, SceneOptions, ScoreOptions};
+use super::bar::Bar;
 use super::output;
-use super::reproduce::Progress;
 use crate::effects::{Kind, Location};
 use crate::lab::challenge::folder::{self, COMMITMENT, MANIFEST, SEAL};
 use crate::lab::challenge::score::{self, closes, restorable};
 use crate::lab::challenge::verdict::{Diagnose, Gap, Verdict, nothing};
 use crate::lab::challenge::{CaseTruth, Folder, Options, TrueEffect, case};
 use crate::lab::reproduce::arms::arm8;
-use crate::lab::reproduce::bench::Watcher;
 use crate::recording::truth_file::write_whole;
 use crate::report;
 use crate::scene::SceneFile;
@@ -122,10 +121,10 @@ fn new(global: &Global, options: &NewOptions) -> anyhow::Result<Outcome> {
     if cases.repeats == 0 {
         output::note(global, "note: no configuration is read twice: the noise cannot be estimated from repeats");
     }
-    let progress = Progress::new(global);
+    let bar = Bar::new(global, None);
     let start = Instant::now();
-    let manifest = folder::create(&path, &base, &cases, seed, &progress)?;
-    progress.end();
+    let manifest = folder::create(&path, &base, &cases, seed, &bar.steps())?;
+    bar.end();
     output::note(global, &format!("{:.1} s", start.elapsed().as_secs_f64()));
     output::show(
         global,
@@ -305,19 +304,20 @@ fn diagnoses(
     name: &str,
 ) -> anyhow::Result<Vec<(Verdict, f64)>> {
     let count = folder.manifest.cases.len();
-    let progress = Progress::new(global);
-    progress.begin(doing, count);
+    let bar = Bar::new(global, None);
+    let steps = bar.steps();
+    steps.begin(doing, count)?;
     let said: Vec<(serde_json::Value, f64)> = (0..count)
         .into_par_iter()
         .map(|index| {
             let case = folder.case(index)?;
             let start = Instant::now();
             let verdict = diagnose(&case).map_err(|why| anyhow::anyhow!("{}: {why}", case.path.display()))?;
-            progress.step();
+            steps.done()?;
             Ok((verdict, start.elapsed().as_secs_f64()))
         })
         .collect::<anyhow::Result<_>>()?;
-    progress.end();
+    bar.end();
     for (case, (verdict, _)) in folder.manifest.cases.iter().zip(&said) {
         let path = folder.path.join(name).join(case.file.replace(".mcap", ".json"));
         output::write(&path, &format!("{}\n", serde_json::to_string_pretty(verdict)?))?;
@@ -337,8 +337,9 @@ fn told(
     if count == 0 {
         return Ok(vec![None; truths.len()]);
     }
-    let progress = Progress::new(global);
-    progress.begin("knowing", count);
+    let bar = Bar::new(global, None);
+    let steps = bar.steps();
+    steps.begin("knowing", count)?;
     let gaps = (0..truths.len())
         .into_par_iter()
         .map(|index| {
@@ -350,11 +351,11 @@ fn told(
             let only = truths[index].effects.iter().filter_map(is).collect();
             let found = diagnosed_among(&case, Some(only)).map_err(|why| anyhow::anyhow!("{}: {why}", case.path.display()))?;
             let found: Verdict = serde_json::from_value(found).context("the diagnosis is no verdict")?;
-            progress.step();
+            steps.done()?;
             Ok(found.gap)
         })
         .collect::<anyhow::Result<_>>()?;
-    progress.end();
+    bar.end();
     Ok(gaps)
 }
 

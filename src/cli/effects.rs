@@ -5,6 +5,7 @@ use serde_json::json;
 
 use super::Outcome;
 use super::arguments::{EffectsOptions, Global};
+use super::bar::Bar;
 use super::output;
 use crate::lab::effect_validation::{self, Line};
 use crate::report;
@@ -22,15 +23,17 @@ pub(crate) fn command(global: &Global, options: &EffectsOptions) -> anyhow::Resu
     let scene = &file.scene;
     let planned = effect_validation::session(&scene.arm, usize::from(options.poses), scene.seed);
     let cases = effect_validation::cases(&scene.arm);
-    let progress = output::progress(global, "validating", cases.len() as u64);
+    let bar = Bar::new(global, None);
+    let steps = bar.steps();
+    steps.begin("validating", cases.len())?;
     // One after the other: a clock beside other work tells nothing.
     let mut lines: Vec<Line> = Vec::with_capacity(cases.len());
     for case in &cases {
         let line = effect_validation::validate(scene, case, &planned).with_context(|| path.display().to_string())?;
         lines.push(line);
-        progress.inc(1);
+        steps.done()?;
     }
-    progress.finish_and_clear();
+    bar.end();
     output::show(global, &format!("{}: {}\n", scene.name, scene.arm_note))?;
     output::show(global, &report::effects::validation(&lines))?;
     output::show_json(global, &json!({ "scene": scene.name, "seed": scene.seed, "poses": options.poses, "effects": lines }))?;

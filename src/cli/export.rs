@@ -8,7 +8,7 @@ use super::arguments::{ExportOptions, Format, Global};
 use super::input::{input_stem, is_recording};
 use super::output;
 use crate::arm::urdf;
-use crate::event::Event;
+use crate::event::{self, Event};
 use crate::measurement::{Measurement, Sensor, table};
 use crate::{recording, scene, session};
 
@@ -50,14 +50,7 @@ fn from_recording(global: &Global, options: &ExportOptions) -> anyhow::Result<(&
     }
     let start = &recording.start;
     let scene = || scene::parse(&start.scene, &format!("{} (scene)", path.display()));
-    let measured: Vec<Measurement> = recording
-        .events
-        .iter()
-        .filter_map(|event| match event {
-            Event::Measured(measurement) => Some(measurement.clone()),
-            _ => None,
-        })
-        .collect();
+    let measured = event::measurements(&recording.events);
     match options.to {
         Format::Toml if start.scene.is_empty() => {
             bail!("{} is a recording of a real arm and holds no scene; export its urdf or its csv", path.display())

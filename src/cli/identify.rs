@@ -10,7 +10,7 @@ use super::arguments::{Global, IdentifyOptions};
 use super::input;
 use super::output::{self, Audience};
 use crate::arm::Arm;
-use crate::event::{Event, RealCell, Start};
+use crate::event::{self, Event, RealCell, Start};
 use crate::measurement::{Measurement, Role, table};
 use crate::progress::Progress as _;
 use crate::{recording, report, scene, session};
@@ -115,11 +115,7 @@ fn with_evaluation(mut measurements: Vec<Measurement>, options: &IdentifyOptions
         if let Some(cut) = recording.cut.filter(|_| !options.partial) {
             bail!("{cut}; --partial uses what is there");
         }
-        let measured = recording.events.into_iter().filter_map(|event| match event {
-            Event::Measured(measurement) => Some(measurement),
-            _ => None,
-        });
-        measured.collect()
+        event::measurements(&recording.events)
     } else {
         let table = table::read(other)?;
         input::check_units(other, &table, arm)?;

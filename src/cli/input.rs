@@ -8,7 +8,7 @@ use super::arguments::{Global, RobotOptions};
 use super::output;
 use crate::arm::Arm;
 use crate::arm::{JointKind, urdf};
-use crate::event::{Event, RealCell, Start};
+use crate::event::{self, RealCell, Start};
 use crate::measurement::{Measurement, table};
 use crate::{recording, scene, session};
 
@@ -29,14 +29,7 @@ pub(crate) fn recorded(global: &Global, path: &Path, partial: bool) -> anyhow::R
     if let Some(warning) = &recording.version_warning {
         output::note(global, &format!("note: {warning}"));
     }
-    let measurements: Vec<Measurement> = recording
-        .events
-        .into_iter()
-        .filter_map(|event| match event {
-            Event::Measured(measurement) => Some(measurement),
-            _ => None,
-        })
-        .collect();
+    let measurements = event::measurements(&recording.events);
     ensure!(
         !measurements.is_empty(),
         "{} holds no measurements; make some with `kincal measure` or `kincal run`",

@@ -3,6 +3,7 @@
 //! Exit codes: 0 done; 1 done, but the answer is bad (a fit that did not converge, a replay that differs); 2 the input is wrong.
 
 mod arguments;
+mod bar;
 mod challenge;
 mod design;
 mod diagnose;

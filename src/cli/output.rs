@@ -1,21 +1,20 @@
 //! What commands share: scenes with overrides, the file names of a run, listeners, and where text goes.
 
-use std::io::{IsTerminal, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::Outcome;
 use super::arguments::{Global, SceneOptions};
+use super::bar::Bar;
 use crate::arm::Arm;
-use crate::design::problem::{Criterion, DesignProblem};
+use crate::design::problem::DesignProblem;
 use crate::event::Event;
 use crate::identification::outcome::Identification;
-use crate::progress::Stopped;
+use crate::progress::{Progress, Stopped};
 use crate::recording::truth_file::write_whole;
 use crate::recording::write::Recorder;
-use crate::report::criterion::Words;
 use crate::scene::{Scene, SceneFile};
 use crate::simulation::injected::Injected;
 
@@ -169,7 +168,7 @@ pub(crate) struct Audience {
     recorder: Option<Recorder>,
     #[cfg(feature = "viewer")]
     viewer: Option<crate::viewing::Viewer>,
-    progress: Progress,
+    bar: Bar,
 }
 
 impl Audience {
@@ -193,18 +192,17 @@ impl Audience {
         #[cfg(not(feature = "viewer"))]
         let _ = name;
         let recorder = stem.map(|stem| Recorder::create(&global.out, stem, arm)).transpose()?;
-        let visible = !global.quiet && std::io::stderr().is_terminal();
         Ok(Audience {
             recorder,
             #[cfg(feature = "viewer")]
             viewer,
-            progress: Progress::new(visible, design.map(|design| design.criterion)),
+            bar: Bar::new(global, design.map(|design| design.criterion)),
         })
     }
 
     /// Ends the progress bar, the viewer and the recording; the path of the recording.
     pub(crate) fn finish(mut self) -> anyhow::Result<Option<PathBuf>> {
-        self.progress.bar.finish_and_clear();
+        self.bar.end();
         // The recording first: whatever becomes of the viewer, it is worth keeping.
         let recording = self.recorder.take().map(Recorder::finish).transpose()?;
         #[cfg(feature = "viewer")]
@@ -229,9 +227,9 @@ impl Drop for Audience {
     }
 }
 
-impl crate::progress::Progress<&Event> for Audience {
+impl Progress<&Event> for Audience {
     fn report(&mut self, event: &Event) -> Result<(), Stopped> {
-        self.progress.see(event);
+        self.bar.report(event)?;
         if let Some(recorder) = &mut self.recorder {
             recorder.report(event)?;
         }
@@ -240,59 +238,5 @@ impl crate::progress::Progress<&Event> for Audience {
             viewer.report(event)?;
         }
         Ok(())
-    }
-}
-
-/// A progress bar of `length` steps for people at a terminal; hidden for everyone else.
-pub(crate) fn progress(global: &Global, what: &'static str, length: u64) -> ProgressBar {
-    let progress = Progress::new(!global.quiet && std::io::stderr().is_terminal(), None);
-    progress.start(what, length);
-    progress.bar
-}
-
-struct Progress {
-    bar: ProgressBar,
-    criterion: Words,
-}
-
-impl Progress {
-    fn new(visible: bool, criterion: Option<Criterion>) -> Self {
-        let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        Progress { bar: ProgressBar::with_draw_target(None, target), criterion: Words::new(criterion) }
-    }
-
-    fn see(&self, event: &Event) {
-        match event {
-            Event::Swarm(iteration) => {
-                if iteration.iteration == 0 {
-                    self.start("choosing", iteration.iterations as u64);
-                }
-                self.bar.set_position(iteration.iteration as u64);
-                let best = iteration.best_value();
-                self.bar.set_message(best.map(|best| self.criterion.value(best)).unwrap_or_default());
-            }
-            Event::Designed(outcome) => {
-                self.start("measuring", outcome.configurations.len() as u64);
-            }
-            Event::Measured(measurement) => self.bar.set_position(measurement.index as u64 + 1),
-            Event::Search(step) => {
-                if step.step == 0 {
-                    self.start("choosing", step.budget);
-                }
-                self.bar.set_position(step.evaluations);
-                self.bar.set_message(self.criterion.value(step.best));
-            }
-            Event::Start(_) | Event::Identified(_) | Event::Diagnosed(_) | Event::Note(_) => {}
-        }
-    }
-
-    fn start(&self, what: &'static str, length: u64) {
-        if let Ok(style) = ProgressStyle::with_template("{prefix:>10} {bar:40} {pos}/{len} {msg} {eta}") {
-            self.bar.set_style(style);
-        }
-        self.bar.set_prefix(what);
-        self.bar.set_message("");
-        self.bar.set_length(length);
-        self.bar.set_position(0);
     }
 }

@@ -7,8 +7,8 @@ use serde_json::json;
 
 use super::Outcome;
 use super::arguments::{Global, PowerOptions};
+use super::bar::Bar;
 use super::output;
-use super::reproduce::Progress;
 use crate::arm::Arm;
 use crate::effects::Kind;
 use crate::lab::challenge::{case, power};
@@ -46,10 +46,10 @@ pub(super) fn command(global: &Global, options: &PowerOptions) -> anyhow::Result
     for extension in ["json", "svg", "png"] {
         output::check_target(&path(extension))?;
     }
-    let progress = Progress::new(global);
+    let bar = Bar::new(global, None);
     let start = Instant::now();
-    let found = power::check(&base, &check, &progress)?;
-    progress.end();
+    let found = power::check(&base, &check, &bar.steps())?;
+    bar.end();
     output::note(global, &format!("{:.1} s", start.elapsed().as_secs_f64()));
     let figure = report::power::figure(&found);
     output::write(&path("json"), &format!("{}\n", serde_json::to_string_pretty(&found)?))?;

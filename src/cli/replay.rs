@@ -6,7 +6,7 @@ use serde_json::json;
 use super::Outcome;
 use super::arguments::{Global, ReplayOptions};
 use super::output::{self, Audience};
-use crate::event::Event;
+use crate::event::{self, Event};
 use crate::progress::{Progress, Stopped};
 use crate::recording::compare::Comparer;
 use crate::recording::truth_file::TruthFile;
@@ -17,17 +17,13 @@ use crate::{recording, scene};
 pub(crate) fn command(global: &Global, options: &ReplayOptions) -> anyhow::Result<Outcome> {
     let path = &options.recording;
     let recorded = recording::read::read(path)?;
-    let measurements = recorded.events.iter().filter_map(|event| match event {
-        Event::Measured(measurement) => Some(measurement.clone()),
-        _ => None,
-    });
+    let measurements = event::measurements(&recorded.events);
     let (file, real) = match &recorded.start.real {
         Some(real) => {
             if let Some(cut) = &recorded.cut {
                 anyhow::bail!("{cut}; nothing was compared, because all rows of a table together say where its arm stands");
             }
             let robot = session::real_robot(&recorded.start, real).with_context(|| path.display().to_string())?;
-            let measurements: Vec<_> = measurements.collect();
             (None, Some(session::real_arm(real, robot, &measurements).with_context(|| path.display().to_string())?))
         }
         None => (Some(scene::parse(&recorded.start.scene, &format!("{} (scene)", path.display()))?), None),

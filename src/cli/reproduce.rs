@@ -1,18 +1,17 @@
 //! `kincal reproduce`: experiments of the paper beside its numbers.
 
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 use std::time::Instant;
 
 use anyhow::{Context, ensure};
-use indicatif::ProgressBar;
 use serde_json::json;
 
 use super::Outcome;
 use super::arguments::{Global, ReproduceOptions};
+use super::bar::Bar;
 use super::output;
 use crate::lab::reproduce::arms::arms;
-use crate::lab::reproduce::bench::{Bench, Watcher};
+use crate::lab::reproduce::bench::Bench;
 use crate::lab::reproduce::findings::Findings;
 use crate::lab::reproduce::{ALL, BEYOND, Experiment};
 use crate::recording::truth_file::write_whole;
@@ -44,18 +43,19 @@ pub(crate) fn command(global: &Global, options: &ReproduceOptions) -> anyhow::Re
     for ((file, path), folder) in scenes.iter().zip(&folders) {
         let injected = output::injected(file, path)?;
         output::show(global, &format!("{}: {}\n", file.scene.name, file.scene.arm_note))?;
-        let progress = Progress::new(global);
-        let bench = Bench::new(&file.scene, injected, &progress);
+        let bar = Bar::new(global, None);
+        let steps = bar.steps();
+        let bench = Bench::new(&file.scene, injected, &steps);
         for experiment in &experiments {
             let start = Instant::now();
             let trials = options.trials.map_or(experiment.trials, |trials| trials as usize);
-            let findings = (experiment.run)(&bench, trials)?;
-            progress.end();
+            let findings = experiment.run(&bench, trials)?;
+            bar.end();
             let written = write(folder, &findings)?;
             output::note(global, &format!("{} on {}: {:.1} s", experiment.name, findings.arm, start.elapsed().as_secs_f64()));
             output::show(global, &report::findings(&findings))?;
             output::show(global, &format!("{}\n", listed(folder, &written)))?;
-            not_converged += findings.fits.not_converged;
+            not_converged += findings.found.fits.not_converged;
             files.extend(written);
             found.push(findings);
         }
@@ -107,10 +107,10 @@ fn write(folder: &Path, findings: &Findings) -> anyhow::Result<Vec<PathBuf>> {
         Ok(())
     };
     let claims = report::claims(findings);
-    for data in std::iter::once(&claims).chain(&findings.data) {
+    for data in std::iter::once(&claims).chain(&findings.found.data) {
         put(&data.name, "csv", &report::csv(data)?)?;
     }
-    for (name, figure) in &findings.figures {
+    for (name, figure) in &findings.found.figures {
         put(name, "svg", figure.svg()?.as_bytes())?;
         put(name, "png", &figure.png()?)?;
     }
@@ -121,54 +121,4 @@ fn write(folder: &Path, findings: &Findings) -> anyhow::Result<Vec<PathBuf>> {
 fn listed(folder: &Path, written: &[PathBuf]) -> String {
     let names: Vec<_> = written.iter().filter_map(|path| path.file_name()).map(|name| name.to_string_lossy()).collect();
     format!("Written to {}: {}", folder.display(), names.join(", "))
-}
-
-/// Progress bars, one after the other.
-pub(super) struct Progress<'a> {
-    global: &'a Global,
-    bar: Mutex<Option<ProgressBar>>,
-}
-
-impl<'a> Progress<'a> {
-    /// No bar yet.
-    pub(super) fn new(global: &'a Global) -> Self {
-        Progress { global, bar: Mutex::new(None) }
-    }
-
-    fn put(&self, bar: Option<ProgressBar>) {
-        if let Ok(mut held) = self.bar.lock()
-            && let Some(old) = std::mem::replace(&mut *held, bar)
-        {
-            old.finish_and_clear();
-        }
-    }
-
-    /// Takes the bar away.
-    pub(super) fn end(&self) {
-        self.put(None);
-    }
-}
-
-impl Watcher for Progress<'_> {
-    fn begin(&self, what: &'static str, steps: usize) {
-        self.put(Some(output::progress(self.global, what, steps as u64)));
-    }
-
-    fn step(&self) {
-        if let Ok(held) = self.bar.lock()
-            && let Some(bar) = &*held
-        {
-            bar.inc(1);
-        }
-    }
-
-    fn remark(&self, text: &str) {
-        match self.bar.lock() {
-            Ok(held) => match &*held {
-                Some(bar) => bar.suspend(|| output::note(self.global, text)),
-                None => output::note(self.global, text),
-            },
-            Err(_) => output::note(self.global, text),
-        }
-    }
 }

@@ -9,8 +9,8 @@ use serde_json::json;
 
 use super::Outcome;
 use super::arguments::{Global, SceneOptions, SweepOptions};
+use super::bar::Bar;
 use super::output;
-use super::reproduce::Progress;
 use crate::arm::Arm;
 use crate::design::problem::Method;
 use crate::effects::Kind;
@@ -45,8 +45,8 @@ pub(crate) fn command(global: &Global, options: &SweepOptions) -> anyhow::Result
     let stem = output::stem(global, &file, "-sweep");
     let path = global.out.join(format!("{stem}.jsonl"));
     output::check_target(&path)?;
-    let progress = Progress::new(global);
-    let sweep = Sweep::new(&file, injected, &grid, &progress)?;
+    let bar = Bar::new(global, None);
+    let sweep = Sweep::new(&file, injected, &grid, &bar.steps())?;
     let mut results = Results::open(&path, sweep.header(), trials.clone())?;
     let cells = sweep.header().cells.len() as u64;
     if results.count() > 0 {
@@ -60,8 +60,8 @@ pub(crate) fn command(global: &Global, options: &SweepOptions) -> anyhow::Result
             ),
         );
     }
-    sweep.run(trials.clone(), &mut results, &progress)?;
-    progress.end();
+    sweep.run(trials.clone(), &mut results, &bar.steps())?;
+    bar.end();
     drop(results);
     told(global, &stem, &path, trials)
 }
@@ -126,10 +126,9 @@ fn told(global: &Global, stem: &str, path: &Path, trials: Range<u64>) -> anyhow:
     put(at("svg"), figure.svg()?.as_bytes())?;
     put(at("png"), &figure.png()?)?;
     let recording = at("mcap");
-    let rows = cells.iter().map(serde_json::to_vec).collect::<Result<_, _>>()?;
     let tables = [
-        Table { topic: "/sweep", schema: "kincal.Sweep", json_schema: tables::SWEEP, rows: vec![serde_json::to_vec(&header)?] },
-        Table { topic: "/sweep/cell", schema: "kincal.SweepCell", json_schema: tables::SWEEP_CELL, rows },
+        Table::new("/sweep", "kincal.Sweep", std::slice::from_ref(&header))?,
+        Table::new("/sweep/cell", "kincal.SweepCell", &cells)?,
     ];
     tables::write(&recording, &tables, &text)?;
     written.push(recording);

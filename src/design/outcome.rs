@@ -1,14 +1,16 @@
 //! What a design method tells while it runs and when it has ended.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::quality::Indexes;
 use crate::quality::prediction::Prediction;
 
-/// The swarm after one iteration (iteration 0 is the initial swarm).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// The swarm after one iteration (iteration 0 is the initial swarm). In a recording the end points are in the cloud
+/// `/design/swarm/end_points` with the same sequence number.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SwarmIteration {
-    /// k of eq. 36.
+    /// k of eq. 36; 0 is the initial swarm.
     pub iteration: usize,
     /// Iterations that will be made if nothing stops the swarm before.
     pub iterations: usize,
@@ -16,15 +18,15 @@ pub struct SwarmIteration {
     pub fitness: Vec<f64>,
     /// Fitness of each particle's best-known position.
     pub personal_best: Vec<f64>,
-    /// The particle that holds the swarm's best-known position.
+    /// The particle (from 0) that holds the swarm's best-known position.
     pub best_particle: usize,
     /// Indexes of the swarm's best-known position.
     pub best: Indexes,
-    /// Inertia weight ω (eq. 37) and the acceleration factors c1, c2 (eq. 38) that led here; zero in the initial swarm.
+    /// Inertia weight ω (eq. 37) that led here; zero in the initial swarm.
     pub inertia: f64,
-    /// See `inertia`.
+    /// Acceleration factor towards the own best (eq. 38); zero in the initial swarm.
     pub c1: f64,
-    /// See `inertia`.
+    /// Acceleration factor towards the swarm's best (eq. 38); zero in the initial swarm.
     pub c2: f64,
     /// Evaluations of the fitness so far.
     pub evaluations: u64,
@@ -46,7 +48,7 @@ impl SwarmIteration {
 }
 
 /// A step of a search by any other method.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SearchStep {
     /// Number of the step, from 0.
     pub step: usize,
@@ -66,7 +68,7 @@ pub struct SearchStep {
 }
 
 /// Why a method stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StopReason {
     /// The iterations asked for were made.
@@ -80,7 +82,7 @@ pub enum StopReason {
 }
 
 /// Mean, smallest and largest value of each index over random sets of the same size: what choosing is compared with.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RandomReference {
     /// Number of random sets.
     pub sets: usize,
@@ -93,13 +95,16 @@ pub struct RandomReference {
 }
 
 /// The chosen set and how it came about.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct DesignOutcome {
     /// The method's name as in the scene: `coordinate_exchange`, `pso`, ….
     pub method: String,
     /// The criterion's name as in the scene: `i_optimality`, `comprehensive`, ….
     pub criterion: String,
-    /// Its value, as in [`SearchStep::value`].
+    /// The criterion's value, larger is better: an index as it is; `d_optimality` the logarithm of the r-th root of the determinant of
+    /// the information; `i_optimality` and `g_optimality` minus the logarithm of a variance in m², so that exp(−value/2) is the
+    /// position error in m. A billionth of a typical reading's information is added, so that sets that do not determine the
+    /// parameters have finite (poor) values.
     pub value: f64,
     /// Chosen configurations, rad (m for prismatic joints), in the order of measuring.
     pub configurations: Vec<Vec<f64>>,
@@ -129,7 +134,7 @@ pub struct DesignOutcome {
 /// What the choice is worth, told before anything is measured: the position error over the workspace that the readings' noise will
 /// leave in the calibrated model (RMS), for this set, for random ones, and the least that any set of as many configurations can
 /// leave.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Advice {
     /// The chosen set; absent where it does not determine the parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -151,7 +156,7 @@ pub struct Advice {
 }
 
 /// Evenness (eq. 25) in both readings of "workspace".
-#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct EvennessDomains {
     /// Over the reachable workspace.
     pub reachable: f64,

@@ -1,5 +1,6 @@
 //! What is to be chosen, by which method, for which criterion.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::arm::Arm;
@@ -47,7 +48,7 @@ pub struct DesignProblem {
 }
 
 /// How configurations are chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// Particle swarm (Chen et al. 2019, eqs. 33–38).

@@ -6,6 +6,7 @@
 //! predicted does not count.
 
 use nalgebra::{DVector, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::evidence::{Evidence, NoisePrior};
@@ -89,7 +90,7 @@ pub struct Scheme {
 }
 
 /// What the rows of a fold share.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Block {
     /// A region of the workspace.

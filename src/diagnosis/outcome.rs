@@ -1,5 +1,6 @@
 //! What a diagnosis says: the JSON object of `kincal diagnose --json`.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::held_out::Block;
@@ -7,11 +8,8 @@ use super::settings::Settings;
 use crate::effects::signature::shape::{Displacement, Reading, Shape};
 use crate::effects::{Kind, Level};
 
-/// JSON Schema of [`Diagnosis`].
-pub const SCHEMA: &str = include_str!("schema.json");
-
-/// The answer.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// What causes what the calibration leaves.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Diagnosis {
     /// In one word.
     pub verdict: Verdict,
@@ -47,7 +45,7 @@ pub struct Diagnosis {
 }
 
 /// What is left of a reading once geometry is fitted to all of them, without the causes and with them.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Residual {
     /// Row of the input, from 0.
     pub row: usize,
@@ -62,7 +60,7 @@ pub struct Residual {
 }
 
 /// The answer in one word.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Geometry explains everything, and what is realistic would have shown.
@@ -78,18 +76,18 @@ pub enum Verdict {
 }
 
 /// Noise of the sensor.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NoiseFloor {
-    /// m.
+    /// Of a position, m.
     pub position_m: f64,
-    /// rad; absent where no orientations are measured.
+    /// Of an orientation, rad; absent where none are measured.
     pub rotation_rad: Option<f64>,
     /// Where it comes from.
     pub source: NoiseSource,
 }
 
 /// Where the noise floor comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NoiseSource {
     /// Readings of the same configuration under the same conditions.
@@ -101,15 +99,15 @@ pub enum NoiseSource {
 }
 
 /// 3-D position RMS on held-out poses, m.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Gap {
-    /// Base and tool fitted only.
+    /// Base and tool fitted only, m.
     pub nominal_rms_m: f64,
-    /// All geometry fitted.
+    /// All geometry fitted, m.
     pub geometry_rms_m: f64,
-    /// Geometry and what each fold uses of what was chosen for it.
+    /// Geometry and what each fold uses of what was chosen for it, m.
     pub explained_rms_m: f64,
-    /// Noise floor in 3-D.
+    /// Noise floor in 3-D, m.
     pub noise_rms_m: f64,
     /// Share of the gap between geometry and noise that the effects close.
     pub gap_closed: Option<f64>,
@@ -122,24 +120,24 @@ pub struct Gap {
 }
 
 /// 3-D position RMS on held-out poses in another way of leaving out, m.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Blocked {
     /// What the rows of a fold share.
     pub by: Block,
     /// Folds.
     pub folds: usize,
-    /// Base and tool fitted only.
+    /// Base and tool fitted only, m.
     pub nominal_rms_m: f64,
-    /// All geometry fitted.
+    /// All geometry fitted, m.
     pub geometry_rms_m: f64,
-    /// Geometry and what each fold uses of what was chosen for it.
+    /// Geometry and what each fold uses of what was chosen for it, m.
     pub explained_rms_m: f64,
     /// Fold by fold.
     pub left_out: Vec<LeftOut>,
 }
 
 /// What was left out together, and how well the rest predicts it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LeftOut {
     /// The payload or the session.
     pub name: String,
@@ -152,18 +150,19 @@ pub struct LeftOut {
 }
 
 /// Where an effect is.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Place {
     /// What it belongs to.
     pub level: Level,
-    /// From 1.
+    /// Number of the joint or link, from 1; absent where there is none.
+    #[schemars(range(min = 1))]
     pub index: Option<usize>,
     /// Change point, s (row index where the input has no time).
     pub time_s: Option<f64>,
 }
 
 /// A magnitude.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Magnitude {
     /// Positive where the kind has no sign.
     pub value: f64,
@@ -175,7 +174,7 @@ pub struct Magnitude {
 
 /// What a simulation of an effect needs besides kind, place and magnitude; absent where the kind has no such thing. As fitted to all
 /// readings: true = reading + effect. Root is the arm's first frame, where its base stands nominally.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Parameters {
     /// Of a backlash: −1 where the output lags behind the last move, as play makes it; 1 where it leads.
     pub sign: Option<f64>,
@@ -184,6 +183,7 @@ pub struct Parameters {
     /// Of a harmonic: periods per turn of the joint.
     pub order: Option<f64>,
     /// Of a coupling: the joint whose angle counts, from 1; the joint itself where its ratio is off.
+    #[schemars(range(min = 1))]
     pub source: Option<usize>,
     /// Of base (in root; of a drift, over the whole session) or tool (in the tool frame), m. The magnitude is its length, less what
     /// noise adds to a length.
@@ -191,6 +191,7 @@ pub struct Parameters {
     /// With it: rotation vector about the origin of the same frame, rad; zero where only positions of a tool are measured.
     pub rotation_rad: Option<[f64; 3]>,
     /// Of a step: share of the session (0 to 1) after which it happens, midway between two readings.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub after: Option<f64>,
     /// Of a step: place in the order of time, from 0, of the first reading after it.
     pub row: Option<usize>,
@@ -202,7 +203,7 @@ pub struct Parameters {
 }
 
 /// What a named effect was diagnosed to follow: true = reading + sum of coefficient times column.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Signature {
     /// The shape that won, of all variants of its kind.
     #[serde(flatten)]
@@ -227,11 +228,17 @@ impl Signature {
 
 /// A kind, or `unknown` for what has no name.
 mod kind_or_unknown {
+    use schemars::{Schema, SchemaGenerator, json_schema};
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
     use crate::effects::Kind;
 
     pub(super) const UNKNOWN: &str = "unknown";
+
+    pub(super) fn schema(_: &mut SchemaGenerator) -> Schema {
+        let names: Vec<&str> = Kind::ALL.into_iter().map(Kind::name).chain([UNKNOWN]).collect();
+        json_schema!({ "type": "string", "enum": names })
+    }
 
     pub(super) fn serialize<S: Serializer>(kind: &Option<Kind>, serializer: S) -> Result<S::Ok, S::Error> {
         kind.map_or(UNKNOWN, Kind::name).serialize(serializer)
@@ -247,13 +254,14 @@ mod kind_or_unknown {
 }
 
 /// An effect that is named.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Effect {
     /// Kind.
     pub kind: Kind,
     /// Where.
     pub location: Place,
     /// That it is there.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub probability: f64,
     /// How large.
     pub magnitude: Magnitude,
@@ -264,9 +272,9 @@ pub struct Effect {
     pub signature: Option<Signature>,
     /// 3-D RMS on held-out poses before it was added, m.
     pub held_out_rms_before_m: f64,
-    /// And after.
+    /// And after, m.
     pub held_out_rms_after_m: f64,
-    /// 1 − (after² − σ²)/(before² − σ²).
+    /// Share of the gap to the noise that it closes: 1 − (after² − σ²)/(before² − σ²).
     pub gap_closed: Option<f64>,
     /// How many folds chose it, of how many.
     pub folds: [usize; 2],
@@ -275,14 +283,16 @@ pub struct Effect {
 }
 
 /// A hypothesis of a set.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Candidate {
     /// Kind; `None` (written `unknown`) for a shape without a name.
     #[serde(with = "kind_or_unknown")]
+    #[schemars(schema_with = "kind_or_unknown::schema")]
     pub kind: Option<Kind>,
     /// Where.
     pub location: Place,
     /// That it is this one.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub probability: f64,
     /// What it is, for a shape without a name.
     pub detail: String,
@@ -297,7 +307,7 @@ impl Candidate {
 }
 
 /// A hypothesis that this data set would show from some magnitude on, or not at all.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Undetectable {
     /// Kind.
     pub kind: Kind,
@@ -310,7 +320,7 @@ pub struct Undetectable {
 }
 
 /// A least magnitude.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MinimumDetectable {
     /// Absent where no magnitude would show.
     pub value: Option<f64>,
@@ -319,20 +329,22 @@ pub struct MinimumDetectable {
 }
 
 /// What no effect explains.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Unknown {
     /// Something is left.
     pub present: bool,
     /// Of the residual having no structure, all tests together.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub p_value: f64,
     /// Where it shows.
     pub r#where: Option<String>,
 }
 
 /// Mean residual along a joint's motion, by its angle.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Map {
-    /// From 1.
+    /// Number of the joint, from 1.
+    #[schemars(range(min = 1))]
     pub joint: usize,
     /// Middle of each bin, rad (m).
     pub angle: Vec<f64>,

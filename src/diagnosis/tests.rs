@@ -2,7 +2,6 @@
 //! the slope of the potential energy.
 
 use nalgebra::{Cholesky, DMatrix, DVector, UnitQuaternion, Vector3};
-use serde_json::Value;
 
 use super::held_out::{Fold, used};
 use super::outcome::{Diagnosis, NoiseSource, Verdict};
@@ -11,6 +10,7 @@ use crate::arm::Arm;
 use crate::effects::Kind;
 use crate::effects::signature::posture::Mechanism;
 use crate::measurement::{Measurement, Sensor};
+use crate::recording::schema::{check, json_schema};
 use crate::scene;
 use crate::seed::{Stream, stream};
 
@@ -203,69 +203,17 @@ fn too_few_readings_are_refused_and_swapped_joints_are_said() {
     assert!(message.contains("swapped"), "{message}");
 }
 
-/// Checks what the schema of this program uses of JSON Schema: types, enums, required, items, bounds, references, anyOf.
-pub(crate) fn check(root: &Value, schema: &Value, value: &Value, path: &str) -> Result<(), String> {
-    let wrong = |what: &str| Err(format!("{path}: {what}: {value}"));
-    if let Some(reference) = schema["$ref"].as_str() {
-        return check(root, root.pointer(reference.trim_start_matches('#')).ok_or("no such reference")?, value, path);
-    }
-    if let Some(any) = schema["anyOf"].as_array() {
-        return if any.iter().any(|one| check(root, one, value, path).is_ok()) { Ok(()) } else { wrong("none of anyOf") };
-    }
-    if let Some(allowed) = schema["enum"].as_array() {
-        return if allowed.contains(value) { Ok(()) } else { wrong("not in the enumeration") };
-    }
-    let types: Vec<&str> = match &schema["type"] {
-        Value::String(one) => vec![one],
-        Value::Array(several) => several.iter().filter_map(Value::as_str).collect(),
-        _ => return wrong("the schema has no type here"),
-    };
-    let is = |name: &&str| match *name {
-        "object" => value.is_object(),
-        "array" => value.is_array(),
-        "string" => value.is_string(),
-        "number" => value.is_number(),
-        "integer" => value.is_u64() || value.is_i64(),
-        "boolean" => value.is_boolean(),
-        _ => value.is_null(),
-    };
-    if !types.iter().any(is) {
-        return wrong("of another type");
-    }
-    if let Some(number) = value.as_f64() {
-        let below = schema["minimum"].as_f64().is_some_and(|least| number < least)
-            || schema["exclusiveMinimum"].as_f64().is_some_and(|least| number <= least);
-        if below || schema["maximum"].as_f64().is_some_and(|most| number > most) {
-            return wrong("out of bounds");
-        }
-    }
-    for name in schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str) {
-        if value.get(name).is_none() {
-            return wrong(&format!("`{name}` is missing"));
-        }
-    }
-    for (name, of) in value.as_object().into_iter().flatten() {
-        check(root, &schema["properties"][name], of, &format!("{path}/{name}"))?;
-    }
-    let items = value.as_array().map_or(&[][..], Vec::as_slice);
-    let (least, most) = (schema["minItems"].as_u64().unwrap_or(0), schema["maxItems"].as_u64().unwrap_or(u64::MAX));
-    if value.is_array() && !(least..=most).contains(&(items.len() as u64)) {
-        return wrong("of another length");
-    }
-    items.iter().enumerate().try_for_each(|(at, item)| check(root, &schema["items"], item, &format!("{path}/{at}")))
-}
-
 #[test]
 fn what_is_said_is_as_the_schema_has_it() {
-    let schema: Value = serde_json::from_str(super::outcome::SCHEMA).unwrap();
+    let schema = json_schema::<Diagnosis>("kincal diagnose --json");
     let (arm, rows) =
         readings("test/schema", |_, _, approach, joint, _| if joint == 4 { 2e-4 * f64::from(approach[4]) } else { 0.0 });
     let mut value = serde_json::to_value(diagnosed(&arm, &rows, Vec::new())).unwrap();
-    check(&schema, &schema, &value, "").unwrap();
+    check(&schema, &value).unwrap();
     assert!(!value["effects"].as_array().unwrap().is_empty() && !value["undetectable"].as_array().unwrap().is_empty());
     // The check can fail.
     value["effects"][0]["kind"] = "gremlins".into();
-    assert!(check(&schema, &schema, &value, "").unwrap_err().contains("/effects/0/kind"));
+    assert!(check(&schema, &value).unwrap_err().contains("/effects/0/kind"));
 }
 
 #[test]

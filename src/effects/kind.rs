@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::descriptor::{Descriptor, Load, Need, Neighbour, Range, SceneKeys, ScenePlace, Source, Unit};
@@ -9,7 +10,7 @@ use super::location::Level;
 use crate::units::ARCSEC;
 
 /// A kind of un-modelled effect; those that the diagnosis has a name for come first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
     /// A joint turns under the torque about its axis.

@@ -1,9 +1,10 @@
 //! Where an effect sits.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What an effect belongs to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Level {
     /// A joint.
@@ -19,7 +20,7 @@ pub enum Level {
 }
 
 /// Where an effect sits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 pub struct Location {
     /// What it belongs to.
     pub level: Level,

@@ -1,14 +1,14 @@
 //! Figures: one description, drawn as SVG and as PNG.
 //!
 //! A [`Figure`] is a grid of [`Panel`]s, a panel has axes and [`Series`]. What is drawn is first laid out as a list of shapes,
-//! which does not depend on the format; `plotters` draws the list. The font comes with the program, so that a figure is the
-//! same on a machine without any. The same figure gives the same bytes.
+//! which does not depend on the format; `svg` writes the list, `tiny-skia` paints it. The font comes with the program, so that a
+//! figure is the same on a machine without any. The same figure gives the same bytes.
 //!
 //! Nothing in the data is an error: values that are not finite, or not positive on a logarithmic axis, are left out, and a panel
 //! in which nothing remains says so.
 
 mod axis;
-mod canvas;
+mod face;
 mod panel;
 mod shape;
 mod spatial;
@@ -29,12 +29,9 @@ pub enum FigureError {
         /// Height asked for, in points of the figure.
         height: f64,
     },
-    /// The plotting library refused a shape.
-    #[error("the figure cannot be drawn: {0}")]
-    Drawing(String),
     /// The picture could not be compressed.
     #[error("the figure cannot be encoded: {0}")]
-    Encoding(#[from] png::EncodingError),
+    Encoding(String),
 }
 
 /// A figure of a paper: a title over a grid of panels.

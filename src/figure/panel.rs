@@ -1,7 +1,7 @@
 //! Where everything of a figure stands.
 
 use super::axis::{Needs, Ruler, Tick, extent, significant, usable};
-use super::canvas::Face;
+use super::face::Face;
 use super::shape::{Anchor, Rgb, Shape, Sheet};
 use super::{Colour, Figure, FigureError, Kind, Marker, Panel, Series, Shade, spatial};
 

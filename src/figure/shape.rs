@@ -1,28 +1,23 @@
-//! The list of shapes of a figure, and its drawing by the plotting library.
+//! The list of shapes of a figure, written as SVG (`svg`) and painted as PNG (`tiny-skia`).
 
-use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use svg::Document;
+use svg::node::element::{Circle, Polygon, Polyline, Rectangle, Text};
+use tiny_skia::{Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Stroke, Transform};
 
 use super::FigureError;
-use super::canvas::{self, Canvas};
+use super::face::Face;
 
-/// The library draws at whole units; a point of the figure has as many of them.
-pub(super) const UNITS: f64 = 4.0;
+/// Pixels of a PNG for a point of the figure, along each side.
+const PIXELS: f32 = 2.0;
 
-/// A PNG has a pixel for two by two units.
-const UNITS_PER_PIXEL: usize = 2;
-
-/// Units in the largest picture, some hundred megabytes.
-const LARGEST: f64 = 128e6;
+/// Square points in the largest picture, some hundred megabytes.
+const LARGEST: f64 = 8e6;
 
 /// What a viewer without the font may take has almost the same widths.
 const FAMILY: &str = "DejaVu Sans, Verdana, Geneva, sans-serif";
 
-/// The library takes the size of a text as its line height, and writes the size of its letters as this much less.
-const LINE: f64 = 1.24;
-
-/// Half of a digit is above half of an x by so much of the size of the letters; the library centres the latter.
-const RAISED: f64 = 0.09;
+/// From the middle of a digit down to the line that letters stand on, by the size of the letters.
+const BASELINE: f64 = 0.3635;
 
 /// Red, green, blue.
 pub(super) type Rgb = [u8; 3];
@@ -73,85 +68,144 @@ pub(super) struct Sheet {
 }
 
 impl Sheet {
-    fn units(&self) -> Result<(u32, u32), FigureError> {
-        let even = |length: f64| (length.ceil() * UNITS) as u32;
-        if self.width * self.height * UNITS * UNITS <= LARGEST {
-            Ok((even(self.width), even(self.height)))
+    /// Whole points that hold the figure.
+    fn size(&self) -> Result<[f64; 2], FigureError> {
+        if self.width * self.height <= LARGEST {
+            Ok([self.width.ceil(), self.height.ceil()])
         } else {
             Err(FigureError::TooLarge { width: self.width, height: self.height })
         }
     }
 }
 
+/// Hundredths of a point are enough.
+fn rounded(value: f64) -> f64 {
+    // Adding zero makes −0 a plain 0.
+    (value * 100.0).round() / 100.0 + 0.0
+}
+
+fn hexadecimal([r, g, b]: Rgb) -> String {
+    format!("#{r:02X}{g:02X}{b:02X}")
+}
+
+fn listed(points: &[[f64; 2]]) -> String {
+    points.iter().map(|[x, y]| format!("{},{}", rounded(*x), rounded(*y))).collect::<Vec<_>>().join(" ")
+}
+
 pub(super) fn svg(sheet: &Sheet) -> Result<String, FigureError> {
-    let (width, height) = sheet.units()?;
-    let mut text = String::new();
-    draw(&sheet.shapes, SVGBackend::with_string(&mut text, (width, height)), true)?;
-    // The library knows one size; the view box keeps its units.
-    let header = format!("<svg width=\"{width}\" height=\"{height}\"");
-    let points = format!("<svg width=\"{}\" height=\"{}\"", f64::from(width) / UNITS, f64::from(height) / UNITS);
-    Ok(text.replacen(&header, &points, 1))
+    let [width, height] = sheet.size()?;
+    let page = Rectangle::new().set("width", width).set("height", height).set("fill", "#FFFFFF");
+    let mut document = Document::new()
+        .set("width", width)
+        .set("height", height)
+        .set("viewBox", (0.0, 0.0, width, height))
+        .set("font-family", FAMILY)
+        .add(page);
+    for shape in &sheet.shapes {
+        document = match shape {
+            Shape::Path { points, colour, width } => document.add(
+                Polyline::new()
+                    .set("points", listed(points))
+                    .set("fill", "none")
+                    .set("stroke", hexadecimal(*colour))
+                    .set("stroke-width", rounded(*width))
+                    .set("stroke-linejoin", "round"),
+            ),
+            Shape::Area { points, colour, opacity } => {
+                let area = Polygon::new().set("points", listed(points)).set("fill", hexadecimal(*colour));
+                document.add(if *opacity < 1.0 { area.set("fill-opacity", *opacity) } else { area })
+            }
+            Shape::Disc { centre: [x, y], radius, colour } => document.add(
+                Circle::new()
+                    .set("cx", rounded(*x))
+                    .set("cy", rounded(*y))
+                    .set("r", rounded(*radius))
+                    .set("fill", hexadecimal(*colour)),
+            ),
+            Shape::Text { text, at: [x, y], size, anchor, upwards, colour } => {
+                let anchor = match anchor {
+                    Anchor::Start => "start",
+                    Anchor::Middle => "middle",
+                    Anchor::End => "end",
+                };
+                // XML has no control characters.
+                let text = Text::new(text.chars().filter(|c| !c.is_control()).collect::<String>())
+                    .set("font-size", *size)
+                    .set("text-anchor", anchor)
+                    .set("fill", hexadecimal(*colour));
+                let down = BASELINE * size;
+                document.add(if *upwards {
+                    let (x, y) = (rounded(x + down), rounded(*y));
+                    text.set("x", x).set("y", y).set("transform", format!("rotate(-90, {x}, {y})"))
+                } else {
+                    text.set("x", rounded(*x)).set("y", rounded(y + down))
+                })
+            }
+        };
+    }
+    Ok(format!("{document}\n"))
 }
 
 pub(super) fn png(sheet: &Sheet) -> Result<Vec<u8>, FigureError> {
-    let (width, height) = sheet.units()?;
-    let mut units = vec![255; width as usize * height as usize * 3];
-    draw(&sheet.shapes, Canvas::new(&mut units, width, height)?, false)?;
-    let (width, height, pixels) = canvas::reduced(&units, width, height, UNITS_PER_PIXEL);
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, width, height);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    // Large areas of one colour need no better.
-    encoder.set_compression(png::Compression::Fast);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(&pixels)?;
-    writer.finish()?;
-    Ok(bytes)
-}
-
-/// The background is white already, or has to be made so.
-fn draw<B: IntoDrawingArea>(shapes: &[Shape], backend: B, fill: bool) -> Result<(), FigureError> {
-    let area = backend.into_drawing_area();
-    let failed = |error: DrawingAreaErrorKind<B::ErrorType>| FigureError::Drawing(error.to_string());
-    if fill {
-        area.fill(&WHITE).map_err(failed)?;
-    }
-    let unit = |[x, y]: [f64; 2]| ((x * UNITS).round() as i32, (y * UNITS).round() as i32);
-    let rgb = |colour: &Rgb| RGBColor(colour[0], colour[1], colour[2]);
-    for shape in shapes {
+    let [width, height] = sheet.size()?;
+    let pixels = |points: f64| (points as f32 * PIXELS) as u32;
+    let too_large = || FigureError::TooLarge { width, height };
+    let mut picture = Pixmap::new(pixels(width), pixels(height)).ok_or_else(too_large)?;
+    picture.fill(Color::WHITE);
+    let (face, scale) = (Face::new()?, Transform::from_scale(PIXELS, PIXELS));
+    for shape in &sheet.shapes {
         match shape {
             Shape::Path { points, colour, width } => {
-                let points: Vec<_> = points.iter().map(|point| unit(*point)).collect();
-                let stroke = rgb(colour).stroke_width((width * UNITS).round().max(1.0) as u32);
-                area.draw(&PathElement::new(points, stroke)).map_err(failed)?;
+                let stroke =
+                    Stroke { width: *width as f32, line_cap: LineCap::Round, line_join: LineJoin::Round, ..Stroke::default() };
+                if let Some(path) = joined(points, false) {
+                    picture.stroke_path(&path, &paint(*colour, 1.0), &stroke, scale, None);
+                }
             }
             Shape::Area { points, colour, opacity } => {
-                let points: Vec<_> = points.iter().map(|point| unit(*point)).collect();
-                area.draw(&Polygon::new(points, rgb(colour).mix(*opacity))).map_err(failed)?;
+                if let Some(path) = joined(points, true) {
+                    picture.fill_path(&path, &paint(*colour, *opacity), FillRule::Winding, scale, None);
+                }
             }
-            Shape::Disc { centre, radius, colour } => {
-                let radius = (radius * UNITS).round().max(1.0) as u32;
-                area.draw(&Circle::new(unit(*centre), radius, rgb(colour).filled())).map_err(failed)?;
+            Shape::Disc { centre: [x, y], radius, colour } => {
+                if let Some(path) = PathBuilder::from_circle(*x as f32, *y as f32, *radius as f32) {
+                    picture.fill_path(&path, &paint(*colour, 1.0), FillRule::Winding, scale, None);
+                }
             }
-            Shape::Text { text, at, size, anchor, upwards, colour } => {
-                let horizontal = match anchor {
-                    Anchor::Start => HPos::Left,
-                    Anchor::Middle => HPos::Center,
-                    Anchor::End => HPos::Right,
+            Shape::Text { text, at: [x, y], size, anchor, upwards, colour } => {
+                let left = match anchor {
+                    Anchor::Start => 0.0,
+                    Anchor::Middle => -0.5 * face.width(text, *size),
+                    Anchor::End => -face.width(text, *size),
                 };
-                let (transform, shift) =
-                    if *upwards { (FontTransform::Rotate270, [RAISED, 0.0]) } else { (FontTransform::None, [0.0, RAISED]) };
-                let place = unit([at[0] + shift[0] * size, at[1] + shift[1] * size]);
-                let colour = rgb(colour);
-                let style = TextStyle::from((FAMILY, size * LINE * UNITS).into_font().transform(transform))
-                    .color(&colour)
-                    .pos(Pos::new(horizontal, VPos::Center));
-                // XML has no control characters.
-                let text: String = text.chars().filter(|c| !c.is_control()).collect();
-                area.draw(&Text::new(text, place, style)).map_err(failed)?;
+                let turned = if *upwards { Transform::from_rotate(-90.0) } else { Transform::identity() };
+                let placed = turned
+                    .pre_translate(left as f32, (BASELINE * size) as f32)
+                    .post_concat(Transform::from_translate(*x as f32, *y as f32))
+                    .post_concat(scale);
+                if let Some(path) = face.outline(text, *size) {
+                    picture.fill_path(&path, &paint(*colour, 1.0), FillRule::Winding, placed, None);
+                }
             }
         }
     }
-    area.present().map_err(failed)
+    picture.encode_png().map_err(|error| FigureError::Encoding(error.to_string()))
+}
+
+fn joined(points: &[[f64; 2]], closed: bool) -> Option<Path> {
+    let mut path = PathBuilder::new();
+    for (index, [x, y]) in points.iter().enumerate() {
+        let (x, y) = (*x as f32, *y as f32);
+        if index == 0 { path.move_to(x, y) } else { path.line_to(x, y) }
+    }
+    if closed {
+        path.close();
+    }
+    path.finish()
+}
+
+fn paint([r, g, b]: Rgb, opacity: f64) -> Paint<'static> {
+    let mut paint = Paint { anti_alias: true, ..Paint::default() };
+    paint.set_color_rgba8(r, g, b, (opacity * 255.0).round() as u8);
+    paint
 }

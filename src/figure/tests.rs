@@ -1,7 +1,7 @@
 //! Samples of every kind of figure, and what must not go wrong with any data. `KINCAL_FIGURES=folder` keeps the samples.
 
 use super::axis::{Needs, Ruler, significant};
-use super::canvas::Face;
+use super::face::Face;
 use super::*;
 
 /// A sequence that looks random and is the same everywhere.
@@ -179,7 +179,7 @@ fn samples() -> Vec<(&'static str, Figure)> {
     ]
 }
 
-/// Width, height and the pixels.
+/// Width, height and the pixels: red, green, blue and opacity.
 fn decoded(bytes: &[u8]) -> (u32, u32, Vec<u8>) {
     let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
@@ -231,14 +231,15 @@ fn the_picture_has_two_pixels_for_each_point() {
     let figure = trials();
     let (width, height, pixels) = decoded(&figure.png().unwrap());
     assert_eq!(width, 1600);
-    assert!(figure.svg().unwrap().starts_with(&format!("<svg width=\"800\" height=\"{}\" viewBox=\"0 0 3200 ", height / 2)));
-    let blue = pixels.chunks(3).filter(|pixel| *pixel == [0, 114, 178]).count();
+    let points = height / 2;
+    assert!(figure.svg().unwrap().contains(&format!("height=\"{points}\" viewBox=\"0 0 800 {points}\" width=\"800\"")));
+    let blue = pixels.chunks(4).filter(|pixel| *pixel == [0, 114, 178, 255]).count();
     assert!(blue > 20 * 100, "{blue}");
     // Nothing touches the edge.
-    let row = width as usize * 3;
+    let row = width as usize * 4;
     let edge = |y: usize| pixels[y * row..(y + 1) * row].iter().all(|byte| *byte == 255);
     assert!((0..16).all(edge) && (height as usize - 16..height as usize).all(edge));
-    assert!(pixels.chunks(row).all(|line| line[..24].iter().chain(&line[row - 24..]).all(|byte| *byte == 255)));
+    assert!(pixels.chunks(row).all(|line| line[..32].iter().chain(&line[row - 32..]).all(|byte| *byte == 255)));
 }
 
 #[test]
@@ -353,7 +354,7 @@ fn texts_cannot_break_the_file() {
     let panel = Panel::new(axis(), axis()).titled(name).with(Series::new(name, Kind::Points(vec![[1.0, 2.0]])));
     let figure = Figure::new(name, 1).with(panel);
     let text = figure.svg().unwrap();
-    assert!(text.contains("a&lt;b &amp; &quot;c&quot; &gt; d") && !text.contains('\u{1}'));
+    assert!(text.contains("a&lt;b &amp; \"c\" &gt; d") && !text.contains('\u{1}'));
     assert!(figure.png().is_ok());
 }
 

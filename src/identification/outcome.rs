@@ -1,9 +1,10 @@
 //! The result of an identification: what `kincal identify --json` prints and what is recorded.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The identified arm and how well it predicts.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Identification {
     /// Whether the fit converged; the parameters mean nothing where it did not.
     pub converged: bool,
@@ -42,7 +43,7 @@ pub struct Identification {
 }
 
 /// One parameter.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ParameterEstimate {
     /// As in the chain: `alpha3`.
     pub name: String,
@@ -63,7 +64,7 @@ pub struct ParameterEstimate {
 ///
 /// What is estimated, and what the interval is about, is the value that the independent parameters take while the dropped ones
 /// stand at their nominal values and the arm's poses stay the same. To first order, at the solution, that is the expression.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Combination {
     /// Name of the independent parameter.
     pub name: String,
@@ -80,7 +81,7 @@ pub struct Combination {
 }
 
 /// Root of the mean squared length of the declared noise of the fitted configurations.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct DeclaredNoise {
     /// Of a position (three axes), m.
     pub position_m: f64,
@@ -90,7 +91,7 @@ pub struct DeclaredNoise {
 }
 
 /// Errors over a set of configurations.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Errors {
     /// Number of configurations.
     pub count: usize,
@@ -102,7 +103,7 @@ pub struct Errors {
 }
 
 /// Four numbers about a sample.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Summary {
     /// Smallest.
     pub min: f64,
@@ -115,7 +116,7 @@ pub struct Summary {
 }
 
 /// Measured minus predicted pose of one configuration, before and after.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Residual {
     /// Index of the measurement.
     pub index: usize,

@@ -7,6 +7,7 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::effect_validation::undecided;
@@ -21,6 +22,7 @@ use crate::effects::{Kind, Load};
 use crate::measurement::{Measurement, Sensor};
 use crate::simulation::effect::{Effect, Foot, Growing, Moves};
 use crate::simulation::physics::{Conditions, PhysicalArm, PhysicsError, Settling, Stop};
+use crate::statistics;
 use crate::units::micrometres as um;
 
 /// Displacements agree where they differ by less than this share of the effect's,
@@ -38,7 +40,7 @@ const TRAVEL: [f64; 2] = [0.1, 0.1];
 const NEXT_TO_NOTHING_KG: f64 = 1e-3;
 
 /// What the physics says of a diagnosis: `confirmation` of `kincal diagnose --confirm --json`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Confirmation {
     /// In one word.
     pub verdict: Answer,
@@ -59,7 +61,7 @@ pub struct Confirmation {
 }
 
 /// The answer in one word.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Answer {
     /// Formulas and physics agree, and nothing more is left than the diagnosis says.
@@ -73,7 +75,7 @@ pub enum Answer {
 }
 
 /// An effect more.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Step {
     /// Kind.
     pub kind: Kind,
@@ -287,8 +289,7 @@ fn length([x, y, z, ..]: &Displacement) -> f64 {
 }
 
 fn rms(displacements: &[Displacement]) -> f64 {
-    let squares: f64 = displacements.iter().map(|one| length(one) * length(one)).sum();
-    libm::sqrt(squares / displacements.len().max(1) as f64)
+    statistics::rms(displacements.iter().map(length))
 }
 
 /// What the physics must be told to make `effect` happen as it was diagnosed; in words, why it cannot.
@@ -547,6 +548,7 @@ mod tests {
     use crate::effects::signature::library::{Hypothesis, library};
     use crate::lab::effect_validation::session;
     use crate::progress::Silent;
+    use crate::recording::schema::{check, json_schema};
     use crate::scene::Scene;
     use crate::simulation::cell::measure::measure;
     use crate::simulation::injected::Injected;
@@ -787,11 +789,9 @@ mod tests {
             named(&of(Kind::MeasurementScale, Shape::Scale, None), &[5e-5], 30),
         ];
         let diagnosis = Diagnosis { effects, ..diagnosed(&scene, &rows) };
-        let schema: serde_json::Value = serde_json::from_str(outcome::SCHEMA).unwrap();
-        let mut value = serde_json::to_value(&diagnosis).unwrap();
         let found = confirm(&diagnosis, &scene.arm, &scene.sensor, &rows).unwrap();
-        value["confirmation"] = serde_json::to_value(&found).unwrap();
-        crate::diagnosis::tests::check(&schema, &schema, &value, "").unwrap();
+        let schema = json_schema::<Confirmation>("confirmation");
+        check(&schema, &serde_json::to_value(&found).unwrap()).unwrap();
         // Columns stand under each other.
         let text = crate::report::confirm::text(&found);
         let widths: Vec<usize> =

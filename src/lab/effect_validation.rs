@@ -23,6 +23,7 @@ use crate::simulation::cell::plan::Planned;
 use crate::simulation::effect::{Effect, Foot, Growing, Moves};
 use crate::simulation::injected::{Injected, Noise};
 use crate::simulation::physics::{Conditions, PhysicalArm, PhysicsError, SeatedBy, Settled, Settling, Stop};
+use crate::statistics;
 use crate::units::ARCSEC;
 
 /// The mark: within so much of the displacement,
@@ -394,11 +395,10 @@ impl Deviations {
         self.misses = self.misses.max((first - converged).norm());
     }
 
-    fn line(mut self, case: &Case, poses_per_s: f64) -> Line {
+    fn line(self, case: &Case, poses_per_s: f64) -> Line {
         let count = self.displacement.len();
-        let rms = (self.displacement.iter().map(|x| x * x).sum::<f64>() / count.max(1) as f64).sqrt();
-        self.deviation.sort_by(f64::total_cmp);
-        let largest = self.deviation.last().copied().unwrap_or(0.0);
+        let rms = statistics::rms(self.displacement.iter().copied());
+        let largest = self.deviation.iter().copied().fold(0.0, f64::max);
         // One effect has a mark for its speed; those of the sensor are no simulation of the arm.
         let fast = case.effects.len() > 1 || poses_per_s >= MARK_POSES_PER_S;
         Line {
@@ -408,7 +408,7 @@ impl Deviations {
             undecided: self.undecided,
             displacement_rms_m: rms,
             largest_m: largest,
-            median_m: self.deviation.get(count / 2).copied().unwrap_or(0.0),
+            median_m: statistics::median(self.deviation.iter().copied()).unwrap_or(0.0),
             largest_over_mark: self.over_mark,
             largest_relative: if rms > 0.0 { largest / rms } else { 0.0 },
             settling_error_m: self.settling_m,

@@ -4,10 +4,11 @@ pub mod equations;
 pub mod table;
 
 use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What a measured configuration is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
     /// Parameters are fitted to it.
@@ -19,7 +20,7 @@ pub enum Role {
 
 /// One measured configuration: joint readings, the tool's pose in the measurement frame, and the conditions under which it was read.
 /// What was not recorded is empty or absent.
-#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Measurement {
     /// Position in the order of measuring, from 0.
@@ -30,17 +31,17 @@ pub struct Measurement {
     pub role: Role,
     /// Since the start of the session, s.
     pub time_s: f64,
-    /// Joint readings, rad (m for prismatic joints).
+    /// Joint readings from the base outwards, rad (m for prismatic joints).
     pub joints: Vec<f64>,
     /// Temperatures of the moving links as read, °C, link 1 first; empty where there are no sensors.
     #[serde(default)]
     pub temperatures_c: Vec<f64>,
-    /// Measured origin of the tool frame, m.
+    /// Measured origin of the tool frame in the measurement frame: x, y, z, m.
     pub position_m: [f64; 3],
     /// Which of x, y and z were not read; their numbers stand for nothing.
     #[serde(default, skip_serializing_if = "all_read")]
     pub unread: [bool; 3],
-    /// Measured orientation of the tool frame as quaternion x, y, z, w; absent where the sensor sees positions only.
+    /// Measured orientation of the tool frame in the measurement frame as quaternion x, y, z, w; absent where the sensor sees positions only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[serde(rename = "attitude_xyzw")]
     pub orientation_xyzw: Option<[f64; 4]>,

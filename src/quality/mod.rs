@@ -7,10 +7,11 @@ pub mod observability;
 pub mod prediction;
 pub mod subspace;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Every index of a set of configurations.
-#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Indexes {
     /// Geometric mean of the singular values over the root of their number (eq. 15; Menq and Borm).
     pub o1: f64,

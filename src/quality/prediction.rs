@@ -4,6 +4,7 @@
 //! covariance P M⁻¹ Pᵀ. Its mean over the workspace is what I-optimality (also V- or Q-optimality) makes small, its largest value
 //! what G-optimality makes small (Atkinson, Donev and Tobias 2007, chapter 10).
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::information::{InformationModel, JacobianScratch};
@@ -27,7 +28,7 @@ pub struct PredictionWorkspace {
 }
 
 /// What is expected of a calibrated model that has no error but what noise left in it.
-#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Prediction {
     /// Root of the mean squared position error over the workspace (3-D), m: the root of the I-criterion.
     pub position_rms_m: f64,

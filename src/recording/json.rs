@@ -84,7 +84,7 @@ as_form! {
 impl Source for Diagnosis {
     fn to_json(&self) -> serde_json::Result<Vec<u8>> {
         let mut value = serde_json::to_value(self)?;
-        without_null(&mut value);
+        drop_null(&mut value);
         if let Some(sets) = value.get_mut(SETS).and_then(Value::as_array_mut) {
             sets.iter_mut().for_each(|set| *set = json!({ CANDIDATES: set.take() }));
         }
@@ -100,17 +100,24 @@ impl Source for Diagnosis {
     }
 }
 
-const SETS: &str = "confusion_sets";
-const CANDIDATES: &str = "candidates";
+pub(super) const SETS: &str = "confusion_sets";
+pub(super) const CANDIDATES: &str = "candidates";
+
+/// `value` as JSON without the members of objects that are null.
+pub(super) fn without_null(value: &impl Serialize) -> serde_json::Result<Vec<u8>> {
+    let mut value = serde_json::to_value(value)?;
+    drop_null(&mut value);
+    serde_json::to_vec(&value)
+}
 
 /// Takes out the members of objects that are null.
-fn without_null(value: &mut Value) {
+fn drop_null(value: &mut Value) {
     match value {
         Value::Object(members) => {
             members.retain(|_, member| !member.is_null());
-            members.values_mut().for_each(without_null);
+            members.values_mut().for_each(drop_null);
         }
-        Value::Array(items) => items.iter_mut().for_each(without_null),
+        Value::Array(items) => items.iter_mut().for_each(drop_null),
         _ => {}
     }
 }

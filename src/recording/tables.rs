@@ -9,26 +9,32 @@ use foxglove::messages::{Log, Timestamp, log};
 use mcap::records::MessageHeader;
 use mcap::{McapError, WriteOptions};
 use prost::Message as _;
+use schemars::{JsonSchema, Schema};
+use serde::Serialize;
+use serde_json::Value;
 
+use super::json::without_null;
+use super::schema::recorded;
 use super::topic::Topic;
 
 /// A table.
 #[derive(Clone, Debug)]
 pub struct Table {
-    /// `/sweep/cell`
-    pub topic: &'static str,
-    /// `kincal.SweepCell`
-    pub schema: &'static str,
-    /// JSON Schema of a row.
-    pub json_schema: &'static str,
-    /// Rows as JSON.
-    pub rows: Vec<Vec<u8>>,
+    topic: &'static str,
+    schema: Schema,
+    rows: Vec<Vec<u8>>,
 }
 
-/// JSON Schema of what a sweep was.
-pub const SWEEP: &str = include_str!("schemas/sweep.json");
-/// JSON Schema of a cell of a sweep.
-pub const SWEEP_CELL: &str = include_str!("schemas/sweep_cell.json");
+impl Table {
+    /// A table on `topic` (`/sweep/cell`) whose schema is called `schema` (`kincal.SweepCell`); what is null in a row is not written.
+    ///
+    /// # Errors
+    /// If JSON cannot hold a row.
+    pub fn new<T: Serialize + JsonSchema>(topic: &'static str, schema: &str, rows: &[T]) -> serde_json::Result<Table> {
+        let rows = rows.iter().map(without_null).collect::<Result<_, _>>()?;
+        Ok(Table { topic, schema: recorded::<T>(schema), rows })
+    }
+}
 
 /// Tables could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -70,7 +76,8 @@ fn write_to(path: &Path, tables: &[Table], text: &str) -> Result<(), McapError> 
         MessageHeader { channel_id, sequence, log_time, publish_time: log_time }
     };
     for table in tables {
-        let schema = writer.add_schema(table.schema, "jsonschema", table.json_schema.as_bytes())?;
+        let name = table.schema.get("title").and_then(Value::as_str).unwrap_or_default();
+        let schema = writer.add_schema(name, "jsonschema", table.schema.as_value().to_string().as_bytes())?;
         let channel = writer.add_channel(schema, table.topic, "json", &BTreeMap::new())?;
         for (sequence, row) in table.rows.iter().enumerate() {
             writer.write_to_known_channel(&at(sequence, channel), row)?;

@@ -5,6 +5,13 @@ use std::borrow::Cow;
 use foxglove::Encode;
 use foxglove::messages::{FrameTransforms, JointStates, Log, PointCloud, PoseInFrame, PosesInFrame, SceneUpdate};
 
+use super::schema::recorded;
+use crate::design::outcome::{DesignOutcome, SearchStep, SwarmIteration};
+use crate::diagnosis::outcome::Diagnosis;
+use crate::event::Start;
+use crate::identification::outcome::Identification;
+use crate::measurement::Measurement;
+
 /// A topic of a recording. Poses and points are in the arm's root frame (`base_link`, or `world` where there is one), m.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Topic {
@@ -123,75 +130,61 @@ impl Topic {
     /// `json` or `protobuf`.
     #[must_use]
     pub fn message_encoding(self) -> &'static str {
-        if self.json_schema().is_some() { "json" } else { "protobuf" }
+        match self.form() {
+            Form::Json(..) => "json",
+            Form::Protobuf(..) => "protobuf",
+        }
     }
 
     /// Name of the topic's schema.
     #[must_use]
     pub fn schema_name(self) -> &'static str {
-        match self {
-            Topic::Run => "kincal.Run",
-            Topic::Swarm => "kincal.SwarmIteration",
-            Topic::Search => "kincal.SearchStep",
-            Topic::Design => "kincal.DesignOutcome",
-            Topic::Measurement => "kincal.Measurement",
-            Topic::Identification => "kincal.Identification",
-            Topic::Diagnosis => "kincal.Diagnosis",
-            Topic::Shapes => "foxglove.SceneUpdate",
-            Topic::Transforms => "foxglove.FrameTransforms",
-            Topic::ArmPoints | Topic::SwarmEndPoints | Topic::BestEndPoints | Topic::ResidualsBefore | Topic::ResidualsAfter => {
-                "foxglove.PointCloud"
-            }
-            Topic::Chosen | Topic::PosesPredicted => "foxglove.PosesInFrame",
-            Topic::JointReadings => "foxglove.JointStates",
-            Topic::PoseMeasured | Topic::PoseNominal => "foxglove.PoseInFrame",
-            Topic::Log => "foxglove.Log",
+        match self.form() {
+            Form::Json(name, _) | Form::Protobuf(name, _) => name,
         }
     }
 
     /// The schema as it stands in the file.
     #[must_use]
     pub fn schema(self) -> Schema {
-        if let Some(template) = self.json_schema() {
-            let data = Cow::Owned(expand(template).into_bytes());
-            return Schema { name: self.schema_name().to_owned(), encoding: "jsonschema".to_owned(), data };
+        match self.form() {
+            Form::Json(name, schema) => {
+                let data = Cow::Owned(schema(name).as_value().to_string().into_bytes());
+                Schema { name: name.to_owned(), encoding: "jsonschema".to_owned(), data }
+            }
+            Form::Protobuf(name, schema) => {
+                let (encoding, data) = schema().map_or_else(Default::default, |schema| (schema.encoding, schema.data));
+                Schema { name: name.to_owned(), encoding, data }
+            }
         }
-        let schema = match self.schema_name() {
-            "foxglove.SceneUpdate" => SceneUpdate::get_schema(),
-            "foxglove.JointStates" => JointStates::get_schema(),
-            "foxglove.FrameTransforms" => FrameTransforms::get_schema(),
-            "foxglove.PointCloud" => PointCloud::get_schema(),
-            "foxglove.PosesInFrame" => PosesInFrame::get_schema(),
-            "foxglove.PoseInFrame" => PoseInFrame::get_schema(),
-            _ => Log::get_schema(),
-        };
-        let (encoding, data) = schema.map_or_else(Default::default, |schema| (schema.encoding, schema.data));
-        Schema { name: self.schema_name().to_owned(), encoding, data }
     }
 
-    fn json_schema(self) -> Option<&'static str> {
+    fn form(self) -> Form {
         match self {
-            Topic::Run => Some(include_str!("schemas/run.json")),
-            Topic::Swarm => Some(include_str!("schemas/swarm_iteration.json")),
-            Topic::Search => Some(include_str!("schemas/search_step.json")),
-            Topic::Design => Some(include_str!("schemas/design_outcome.json")),
-            Topic::Measurement => Some(include_str!("schemas/measurement.json")),
-            Topic::Identification => Some(include_str!("schemas/identification.json")),
-            Topic::Diagnosis => Some(include_str!("schemas/diagnosis.json")),
-            _ => None,
+            Topic::Run => Form::Json("kincal.Run", recorded::<Start>),
+            Topic::Swarm => Form::Json("kincal.SwarmIteration", recorded::<SwarmIteration>),
+            Topic::Search => Form::Json("kincal.SearchStep", recorded::<SearchStep>),
+            Topic::Design => Form::Json("kincal.DesignOutcome", recorded::<DesignOutcome>),
+            Topic::Measurement => Form::Json("kincal.Measurement", recorded::<Measurement>),
+            Topic::Identification => Form::Json("kincal.Identification", recorded::<Identification>),
+            Topic::Diagnosis => Form::Json("kincal.Diagnosis", recorded::<Diagnosis>),
+            Topic::Shapes => Form::Protobuf("foxglove.SceneUpdate", SceneUpdate::get_schema),
+            Topic::Transforms => Form::Protobuf("foxglove.FrameTransforms", FrameTransforms::get_schema),
+            Topic::ArmPoints | Topic::SwarmEndPoints | Topic::BestEndPoints | Topic::ResidualsBefore | Topic::ResidualsAfter => {
+                Form::Protobuf("foxglove.PointCloud", PointCloud::get_schema)
+            }
+            Topic::Chosen | Topic::PosesPredicted => Form::Protobuf("foxglove.PosesInFrame", PosesInFrame::get_schema),
+            Topic::JointReadings => Form::Protobuf("foxglove.JointStates", JointStates::get_schema),
+            Topic::PoseMeasured | Topic::PoseNominal => Form::Protobuf("foxglove.PoseInFrame", PoseInFrame::get_schema),
+            Topic::Log => Form::Protobuf("foxglove.Log", Log::get_schema),
         }
     }
 }
 
-/// Puts shared parts in place of `"@name"`: Foxglove follows no `$ref`, and takes neither type lists nor arrays of arrays.
-fn expand(template: &str) -> String {
-    template
-        // Before what stands in it.
-        .replace("\"@least\"", include_str!("schemas/least.json").trim_end())
-        .replace("\"@place\"", include_str!("schemas/place.json").trim_end())
-        .replace("\"@errors\"", include_str!("schemas/errors.json").trim_end())
-        .replace("\"@summary\"", include_str!("schemas/summary.json").trim_end())
-        .replace("\"@prediction\"", include_str!("schemas/prediction.json").trim_end())
-        .replace("\"@indexes\"", include_str!("schemas/indexes.json").trim_end())
-        .replace("\"@configuration\"", include_str!("schemas/configuration.json").trim_end())
+/// How a topic's messages are written: the schema's name, and what makes it.
+enum Form {
+    /// One of kincal's own types.
+    Json(&'static str, fn(&str) -> schemars::Schema),
+    /// One of Foxglove's messages.
+    Protobuf(&'static str, fn() -> Option<foxglove::Schema>),
 }

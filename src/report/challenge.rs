@@ -3,6 +3,7 @@
 use super::table;
 use crate::figure::{Axis, Colour, Estimate, Figure, Kind, Panel, Series};
 use crate::lab::challenge::score::{ANY, Confusion, LAMBDA, NOT_THERE, Restored, Score, Single};
+use crate::statistics::{median, share_interval95};
 
 /// `97 % (31/32)`.
 fn share(part: usize, of: usize) -> String {
@@ -169,12 +170,10 @@ pub fn score(score: &Score, who: &str, seconds: &[f64]) -> String {
         ));
     }
     if !seconds.is_empty() {
-        let mut sorted = seconds.to_vec();
-        sorted.sort_by(f64::total_cmp);
         text.push_str(&format!(
             "Time per case: {:.4} s median, {:.4} s at most (cases side by side on all threads).\n",
-            sorted[sorted.len() / 2],
-            sorted[sorted.len() - 1]
+            median(seconds.iter().copied()).unwrap_or_default(),
+            seconds.iter().copied().fold(0.0, f64::max)
         ));
     }
     text.push_str(
@@ -284,12 +283,10 @@ pub fn confusion(rows: &[Confusion]) -> Result<Vec<u8>, csv::Error> {
 #[must_use]
 pub fn figure(score: &Score) -> Figure {
     let calibration = &score.calibration;
-    // Wilson's interval of the share.
     let points = calibration.reliability.iter().map(|bin| {
-        let (n, p, z) = (bin.statements as f64, bin.true_share, 1.96);
-        let middle = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
-        let half = z * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt() / (1.0 + z * z / n);
-        Estimate { x: bin.stated, y: p, x_interval: None, y_interval: Some([middle - half, middle + half]) }
+        let true_ones = libm::round(bin.true_share * bin.statements as f64) as usize;
+        let interval = share_interval95(true_ones, bin.statements);
+        Estimate { x: bin.stated, y: bin.true_share, x_interval: None, y_interval: Some(interval) }
     });
     let reliability =
         Panel::new(Axis::linear("stated probability").range(0.0, 1.0), Axis::linear("share that is true").range(0.0, 1.0))

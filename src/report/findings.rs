@@ -7,23 +7,23 @@ use crate::units::number;
 /// The published numbers beside ours, the verdict, and what was assumed.
 #[must_use]
 pub fn findings(findings: &Findings) -> String {
-    let rows = findings.claims.iter().map(claim).collect();
+    let rows = findings.found.claims.iter().map(claim).collect();
     let mut text = format!(
         "{} on {} ({})\n{}\n{}\n",
         findings.item,
         findings.arm,
         findings.place,
         table(&["what", "paper", "ours (mean)", "95 %", "bound"], rows),
-        findings.verdict
+        findings.found.verdict
     );
-    let fits = &findings.fits;
+    let fits = &findings.found.fits;
     if fits.fits > 0 {
         text.push_str(&format!(
             "{} fits, {} did not converge, {} held combinations at nominal that their set does not show.\n",
             fits.fits, fits.not_converged, fits.held
         ));
     }
-    for note in &findings.notes {
+    for note in &findings.found.notes {
         text.push_str(&format!("Note: {note}\n"));
     }
     text
@@ -57,7 +57,7 @@ pub fn csv(data: &Data) -> Result<Vec<u8>, csv::Error> {
 #[must_use]
 pub fn claims(findings: &Findings) -> Data {
     let missing = |value: Option<f64>| value.unwrap_or(f64::NAN);
-    let rows = findings.claims.iter().map(|claim| {
+    let rows = findings.found.claims.iter().map(|claim| {
         let [low, high] = claim.ours.and_then(|ours| ours.interval95).unwrap_or([f64::NAN; 2]);
         let trials = claim.ours.map_or(0, |ours| ours.trials);
         let ours = missing(claim.ours.map(|ours| ours.mean));

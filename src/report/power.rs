@@ -4,6 +4,7 @@ use super::table;
 use crate::figure::{Axis, Colour, Estimate, Figure, Kind, Panel, Series};
 use crate::lab::challenge::power::{Curve, Report};
 use crate::lab::injection::units;
+use crate::statistics::share_interval95;
 use crate::units::number;
 
 fn unit(curve: &Curve) -> (&'static str, f64) {
@@ -75,17 +76,11 @@ pub fn figure(report: &Report) -> Figure {
     let mut figure = Figure::new("Is the stated minimum detectable magnitude true?", 2);
     for curve in &report.curves {
         let (unit, factor) = unit(curve);
-        // Wilson's interval of the share.
-        let points = curve.levels.iter().map(|level| {
-            let (n, p, z) = (level.trials as f64, level.named as f64 / level.trials as f64, 1.96);
-            let middle = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
-            let half = z * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt() / (1.0 + z * z / n);
-            Estimate {
-                x: level.magnitude / factor,
-                y: 100.0 * p,
-                x_interval: None,
-                y_interval: Some([100.0 * (middle - half), 100.0 * (middle + half)]),
-            }
+        let points = curve.levels.iter().map(|level| Estimate {
+            x: level.magnitude / factor,
+            y: 100.0 * level.named as f64 / level.trials as f64,
+            x_interval: None,
+            y_interval: Some(share_interval95(level.named, level.trials).map(|end| 100.0 * end)),
         });
         let mut panel = Panel::new(Axis::linear(format!("magnitude ({unit})")), Axis::linear("named (%)").range(0.0, 100.0))
             .titled(format!("{}, {}", curve.kind.name(), place(curve)))

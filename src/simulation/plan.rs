@@ -1,5 +1,6 @@
 //! How the measuring is organised: repeats, sides of approach, payloads, temperatures.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The measuring: how many configurations verify, and in what time.
@@ -39,7 +40,7 @@ pub struct Approach {
 }
 
 /// From which side the joints come to a configuration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ApproachPolicy {
     /// Straight from the configuration measured before it (the first: from zero).

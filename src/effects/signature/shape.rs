@@ -1,6 +1,9 @@
 //! What an effect of unit magnitude does to the target: true pose = pose at the joint readings + effect, to first order.
 
+use std::num::NonZeroUsize;
+
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::posture::Posture;
@@ -20,19 +23,21 @@ use crate::effects::Kind;
 
 /// What an effect follows. Joints and links count from 0 here, and from 1 where it is written; link `i` moves with joint `i`. One column
 /// per number in brackets.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "shape", rename_all = "snake_case")]
 pub enum Shape {
     /// \[1\] A joint turns in proportion to the torque about it.
     Torque {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
     },
     /// \[1\] A turn about a joint's origin in proportion to the moment across its axis.
     MomentAcross {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
     },
     /// \[1\] A link bends as a beam from its joint to the next under the moment across its own direction, which may change along
@@ -40,18 +45,21 @@ pub enum Shape {
     Beam {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
     },
     /// \[1\] A joint is off by half a unit in the direction of its last move.
     Direction {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
     },
     /// \[1\] A joint is off by half a unit in the direction of its torque.
     TorqueSign {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
     },
     /// \[1\] As [`Shape::TorqueSign`], where gravity is not along the nominal direction but leans towards an azimuth about the joint's axis:
@@ -59,6 +67,7 @@ pub enum Shape {
     LeaningTorqueSign {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
         /// rad, from the first axis across ([`across`]).
         azimuth: f64,
@@ -70,6 +79,7 @@ pub enum Shape {
     Harmonic {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
         /// Periods per turn.
         order: f64,
@@ -78,21 +88,25 @@ pub enum Shape {
     TwoHarmonics {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
     },
     /// \[1\] A joint turns by the angle of another, or of its own.
     Ratio {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
         /// Joint whose angle counts.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         source: usize,
     },
     /// \[1\] A link grows with its temperature; all, and the foot, where there is none.
     Growth {
         /// Link.
         #[serde(default, skip_serializing_if = "Option::is_none", with = "from_one_or_none")]
+        #[schemars(with = "Option<NonZeroUsize>")]
         link: Option<usize>,
     },
     /// \[1\] All links grow with their temperatures, and the foot with that of the first link, or not at all.
@@ -104,6 +118,7 @@ pub enum Shape {
     Warmth {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
     },
     /// \[1\] A shift along the force across a joint's axis. Friction of the fit holds what carries less than the share `held` of the
@@ -111,6 +126,7 @@ pub enum Shape {
     ForceAcrossSign {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
         /// Share.
         held: f64,
@@ -120,6 +136,7 @@ pub enum Shape {
     MomentAcrossSign {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
         /// Share.
         held: f64,
@@ -142,18 +159,21 @@ pub enum Shape {
     UnequalBend {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
     },
     /// \[2\] A turn about a joint's origin: the moment across seats it, about the x and y axes of its link unequally.
     UnequalSeat {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
     },
     /// \[2\] A shift: the force across a joint seats it, along the x and y axes of its link unequally.
     UnequalShift {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
     },
     /// \[6\] A twist of the base over a course of time.
@@ -170,6 +190,7 @@ pub enum Shape {
     Bump {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
         /// rad
         centre: f64,
@@ -180,12 +201,14 @@ pub enum Shape {
     AngleCurve {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
     },
     /// \[[`MAP_ORDERS`]\] A joint is off by a free function of its angle: cosines over its travel.
     AngleMap {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
         /// Smallest angle, rad.
         low: f64,
@@ -197,6 +220,7 @@ pub enum Shape {
     Crosstalk {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
         /// The moving side.
         moving: bool,
@@ -205,18 +229,21 @@ pub enum Shape {
     Softening {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
     },
     /// \[2\] Torque, and the root of its size with its sign, turn a joint.
     Hardening {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
     },
     /// \[1\] The torque of past readings, forgotten over a time, turns a joint.
     TorqueMemory {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
         /// Which of [`FORGETTING_S`].
         which: usize,
@@ -227,12 +254,14 @@ pub enum Shape {
     DirectionLoad {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
     },
     /// \[1\] The direction of the last move that was long enough fades with a joint's way: Dahl's memory of a way.
     Memory {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
         /// One of [`MEMORIES`], rad.
         way: f64,
@@ -241,6 +270,7 @@ pub enum Shape {
     TimeCurve {
         /// Joint, or the link that it moves.
         #[serde(with = "from_one")]
+        #[schemars(with = "NonZeroUsize")]
         joint: usize,
     },
 }
@@ -314,7 +344,7 @@ pub enum Family {
 }
 
 /// How something goes with the share of the session that has passed.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Course {
     /// From 0 to 1 about a moment, along a raised cosine that is so wide.

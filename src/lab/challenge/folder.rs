@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::case::{self, CaseTruth, Options};
-use crate::event::{Event, Start};
-use crate::lab::reproduce::bench::Watcher;
+use crate::event::{self, Start};
 use crate::measurement::Measurement;
+use crate::progress::{Steps, Stopped};
 use crate::recording::truth_file::write_whole;
 use crate::recording::{self, ReadError, RecordError};
 use crate::scene::{SceneError, SceneFile};
@@ -56,6 +56,9 @@ pub enum ChallengeError {
         /// What to do.
         remedy: &'static str,
     },
+    /// Whoever was told stopped it.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
     /// A cell could not be diagnosed.
     #[error("a simulated cell cannot be diagnosed: {reason}")]
     Diagnosis {
@@ -157,13 +160,7 @@ fn sha256(bytes: &[u8]) -> String {
 ///
 /// # Errors
 /// If a case cannot be made or written.
-pub fn create(
-    path: &Path,
-    base: &SceneFile,
-    options: &Options,
-    seed: u64,
-    watcher: &dyn Watcher,
-) -> Result<Manifest, ChallengeError> {
+pub fn create(path: &Path, base: &SceneFile, options: &Options, seed: u64, progress: &Steps) -> Result<Manifest, ChallengeError> {
     let io = |action, path: &Path| {
         let path = path.to_owned();
         move |source| ChallengeError::Io { action, path, source, remedy: "choose another folder with --out" }
@@ -173,7 +170,7 @@ pub fn create(
     }
     std::fs::create_dir_all(path).map_err(io("make", path))?;
     let key = case::key(seed);
-    watcher.begin("cases", options.cases);
+    progress.begin("cases", options.cases)?;
     let (mut cases, mut truths) = (Vec::new(), Vec::new());
     for first in (0..options.cases).step_by(BATCH) {
         let batch: Vec<(ManifestCase, CaseTruth)> = (first..(first + BATCH).min(options.cases))
@@ -184,7 +181,7 @@ pub fn create(
                 let (measurements, truth) = case::measured(&public, &hidden, index)?;
                 let written = case::write(path, index, &public, &measurements)?;
                 let bytes = std::fs::read(&written).map_err(io("read", &written))?;
-                watcher.step();
+                progress.done()?;
                 Ok((ManifestCase { file: truth.file.clone(), sha256: sha256(&bytes) }, truth))
             })
             .collect::<Result<_, ChallengeError>>()?;
@@ -283,14 +280,7 @@ impl Folder {
         let file = &self.manifest.cases[index].file;
         let path = self.path.join(file);
         let recording = recording::read(&path)?;
-        let measurements = recording
-            .events
-            .iter()
-            .filter_map(|event| match event {
-                Event::Measured(measurement) => Some(measurement.clone()),
-                _ => None,
-            })
-            .collect();
+        let measurements = event::measurements(&recording.events);
         let name = file.trim_end_matches(".mcap").to_owned();
         Ok(Case { name, path, start: recording.start, measurements, withheld: self.manifest.withheld.clone() })
     }

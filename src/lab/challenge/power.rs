@@ -11,14 +11,14 @@ use super::folder::ChallengeError;
 use crate::diagnosis::outcome::{Diagnosis, NoiseSource, Place};
 use crate::diagnosis::{Options as DiagnosisOptions, diagnose};
 use crate::effects::Kind;
-use crate::lab::reproduce::bench::Watcher;
-use crate::progress::Silent;
+use crate::progress::{Silent, Steps};
 use crate::scene::SceneFile;
 use crate::seed::hidden_stream;
 use crate::session::SessionError;
 use crate::simulation::cell::measure;
 use crate::simulation::effect::Effect;
 use crate::simulation::injected::{Injected, Noise};
+use crate::statistics::nearest_rank;
 
 /// Share of cases at which a magnitude counts as detectable.
 const POWER: f64 = 0.8;
@@ -114,15 +114,15 @@ struct Logistic {
 ///
 /// # Errors
 /// If a cell cannot be simulated or diagnosed.
-pub fn check(base: &SceneFile, options: &Options, watcher: &dyn Watcher) -> Result<Report, ChallengeError> {
+pub fn check(base: &SceneFile, options: &Options, progress: &Steps) -> Result<Report, ChallengeError> {
     let key = case::key(options.seed);
     let public = case::public(base, &options.plan, &key, 0)?;
-    watcher.begin("no effect", options.sets);
+    progress.begin("no effect", options.sets)?;
     let quiet: Vec<Diagnosis> = (0..options.sets)
         .into_par_iter()
         .map(|set| {
             let found = cell(&public, Vec::new(), &injected_key(&key, &format!("power/quiet/{set}")))?;
-            watcher.step();
+            progress.done()?;
             Ok(found)
         })
         .collect::<Result<_, ChallengeError>>()?;
@@ -133,7 +133,7 @@ pub fn check(base: &SceneFile, options: &Options, watcher: &dyn Watcher) -> Resu
             (0..options.levels.len()).flat_map(move |level| (0..options.trials).map(move |trial| (curve, level, trial)))
         })
         .collect();
-    watcher.begin("with effects", jobs.len());
+    progress.begin("with effects", jobs.len())?;
     let seen: Vec<Judged> = jobs
         .par_iter()
         .map(|(curve, level, trial)| {
@@ -144,7 +144,7 @@ pub fn check(base: &SceneFile, options: &Options, watcher: &dyn Watcher) -> Resu
             let arm = &public.file.scene.arm;
             let effect = Effect::drawn(curve.kind, place, size, arm, &mut hidden_stream(&key, &label));
             let found = cell(&public, vec![effect], &injected_key(&key, &label))?;
-            watcher.step();
+            progress.done()?;
             Ok(judged(&found, curve))
         })
         .collect::<Result<_, ChallengeError>>()?;
@@ -228,16 +228,14 @@ fn stated(kind: Kind, place: Option<usize>, quiet: &[Diagnosis]) -> Option<Curve
             shown.get(shown.len().saturating_sub(1) / 2)?.location
         }
     };
-    let mut values: Vec<f64> = quiet.iter().filter_map(|diagnosis| value(diagnosis, &location)).collect();
-    values.sort_by(f64::total_cmp);
-    let seen = 2 * values.len() > quiet.len();
-    let at = |share: f64| values[((values.len() - 1) as f64 * share + 0.5) as usize];
+    let values: Vec<f64> = quiet.iter().filter_map(|diagnosis| value(diagnosis, &location)).collect();
+    let at = |share: f64| nearest_rank(values.iter().copied(), share).filter(|_| 2 * values.len() > quiet.len());
     Some(Curve {
         kind,
         location,
         unit: kind.unit().to_owned(),
-        stated: seen.then(|| at(0.5)),
-        stated_range: seen.then(|| [at(0.1), at(0.9)]),
+        stated: at(0.5),
+        stated_range: at(0.1).zip(at(0.9)).map(|(low, high)| [low, high]),
         levels: Vec::new(),
         measured: None,
         interval95: None,

@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::case::{CaseTruth, TrueEffect};
 use super::verdict::{Gap, NamedEffect, Place, Verdict, level};
+use crate::statistics::{Mean, median};
 
 /// From this probability on an effect counts as named.
 const NAMED: f64 = 0.5;
@@ -578,22 +579,14 @@ fn magnitudes(truths: &[CaseTruth], verdicts: &[Verdict]) -> Vec<Magnitudes> {
     let names = LAMBDA.iter().map(|(_, name)| *name).chain(["all"]);
     names
         .zip(found)
-        .map(|(name, (mut errors, intervals, covered))| {
-            errors.sort_by(f64::total_cmp);
-            let median_error = median(&errors);
-            Magnitudes { lambda: name.to_owned(), given: errors.len(), median_error, intervals, covered }
+        .map(|(name, (errors, intervals, covered))| Magnitudes {
+            lambda: name.to_owned(),
+            given: errors.len(),
+            median_error: median(errors),
+            intervals,
+            covered,
         })
         .collect()
-}
-
-/// The value in the middle of sorted ones.
-fn median(sorted: &[f64]) -> Option<f64> {
-    let middle = sorted.len() / 2;
-    match sorted.len() {
-        0 => None,
-        odd if odd % 2 == 1 => Some(sorted[middle]),
-        _ => Some(0.5 * (sorted[middle - 1] + sorted[middle])),
-    }
 }
 
 fn changes(truths: &[CaseTruth], verdicts: &[Verdict]) -> Vec<Changes> {
@@ -615,7 +608,7 @@ fn changes(truths: &[CaseTruth], verdicts: &[Verdict]) -> Vec<Changes> {
             Changes {
                 kind: kind.to_owned(),
                 given: errors.len(),
-                median_error: median(&errors),
+                median_error: median(errors.iter().copied()),
                 largest_of_90: errors.get(nine).copied(),
             }
         })
@@ -635,14 +628,13 @@ pub fn closes(truth: &CaseTruth, withheld: &[String]) -> bool {
 pub fn closure(pairs: &[(Gap, Gap)]) -> Closure {
     let closed = |gap: &Gap| gap.geometry_rms_m * gap.geometry_rms_m - gap.explained_rms_m * gap.explained_rms_m;
     let something = |gap: &Gap| closed(gap) > SOMETHING * gap.geometry_rms_m * gap.geometry_rms_m;
-    let mut shares: Vec<f64> =
+    let shares: Vec<f64> =
         pairs.iter().filter(|(_, best)| something(best)).map(|(own, best)| closed(own) / closed(best)).collect();
-    shares.sort_by(f64::total_cmp);
     Closure {
         cases: shares.len(),
         nothing_to_close: pairs.len() - shares.len(),
-        median: median(&shares),
-        mean: (!shares.is_empty()).then(|| shares.iter().sum::<f64>() / shares.len() as f64),
+        median: median(shares.iter().copied()),
+        mean: Mean::of(&shares).map(|mean| mean.mean),
         nearly_all: shares.iter().filter(|share| **share >= 0.9).count(),
     }
 }
@@ -685,9 +677,7 @@ pub fn restored(
         };
         let pairs: Vec<(Gap, Gap)> = cases.iter().filter_map(|index| whole[*index].gap.zip(told[*index])).collect();
         let rms = |verdicts: &[Verdict], of: &dyn Fn(Gap) -> Option<f64>| {
-            let mut all: Vec<f64> = cases.iter().filter_map(|index| verdicts[*index].gap.and_then(of)).collect();
-            all.sort_by(f64::total_cmp);
-            median(&all)
+            median(cases.iter().filter_map(|index| verdicts[*index].gap.and_then(of)))
         };
         Restored {
             kind: kind.to_owned(),

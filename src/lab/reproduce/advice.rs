@@ -4,12 +4,10 @@
 //! The prediction has no knob that could have been fitted. The situations are others than those of the bake-off all the same: other
 //! numbers of configurations, other joint ranges, another cone; and the experiment runs on whatever arm it is given.
 
-use rayon::prelude::*;
-
 use super::Experiment;
 use super::arms::cut;
 use super::bench::Bench;
-use super::findings::{Claim, Data, Findings, Tally};
+use super::findings::{Claim, Data, Found, Tally, with_ends};
 use super::situation::{Reach, Sees, Situation};
 use crate::design::candidates::{Rules, Sampler};
 use crate::design::design;
@@ -29,7 +27,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     place: "beyond the paper",
     about: "the gain that kincal design predicts against the gain that calibrations then have",
     trials: 100,
-    run,
+    work: run,
 };
 
 /// Numbers of configurations.
@@ -53,47 +51,42 @@ struct Outcome {
     fits: Tally,
 }
 
-fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
+fn run(bench: &Bench<'_>, trials: usize) -> Result<Found, SessionError> {
     let cells = cells(bench.scene);
-    bench.watcher.begin("advice", cells.len() * (trials + 1));
+    bench.progress.begin("advice", cells.len() * (trials + 1))?;
     let (mut outcomes, mut skipped) = (Vec::new(), Vec::new());
     for (label, scene, situation) in cells {
         let information = InformationModel::new(&scene.arm, &scene.sensor, scene.weights);
         if scene.design.count * information.rows_per_pose() < information.rank() {
             skipped.push(format!("{label}: left out, so few configurations do not determine the parameters."));
-            (0..=trials).for_each(|_| bench.watcher.step());
+            (0..=trials).try_for_each(|_| bench.progress.done())?;
             continue;
         }
         let chosen = design(&scene.request(), &mut Silent);
-        bench.watcher.step();
+        bench.progress.done()?;
         let outcome = chosen?;
         let told = outcome.advice.and_then(|advice| Some((advice, advice.chosen?, advice.random?)));
         // Too few configurations for this arm, most likely.
         let Some((advice, set, random)) = told else {
             let why = outcome.no_advice.unwrap_or_else(|| "so few configurations do not determine the parameters".to_owned());
             skipped.push(format!("{label}: left out, {why}."));
-            (0..trials).for_each(|_| bench.watcher.step());
+            (0..trials).try_for_each(|_| bench.progress.done())?;
             continue;
         };
         let chosen = outcome.configurations.concat();
         let rules = Rules::measurable(&scene.arm, &scene.sensor);
         let injected = situation.injected(bench.scene);
         let rank = outcome.indexes.rank;
-        let fits: Vec<[(Option<f64>, bool); 2]> = (0..trials)
-            .into_par_iter()
-            .map(|number| {
-                let trial = Trial::new(&scene, &injected, number)?;
-                let drawn = Sampler::new(&rules).draw(&mut stream(trial.seed(), "advice/random"), scene.design.count)?;
-                let rms = |set: &[f64]| {
-                    let result = trial.calibrate(set)?;
-                    let held = result.identification.rank < rank;
-                    Ok::<_, SessionError>((result.converged.then_some(result.after.position_m.rms), held))
-                };
-                let errors = [rms(&chosen)?, rms(&drawn)?];
-                bench.watcher.step();
-                Ok(errors)
-            })
-            .collect::<Result<_, SessionError>>()?;
+        let fits: Vec<[(Option<f64>, bool); 2]> = bench.parts(trials, |number| {
+            let trial = Trial::new(&scene, &injected, number)?;
+            let drawn = Sampler::new(&rules).draw(&mut stream(trial.seed(), "advice/random"), scene.design.count)?;
+            let rms = |set: &[f64]| {
+                let result = trial.calibrate(set)?;
+                let held = result.identification.rank < rank;
+                Ok::<_, SessionError>((result.converged.then_some(result.after.position_m.rms), held))
+            };
+            Ok([rms(&chosen)?, rms(&drawn)?])
+        })?;
         let (ours, theirs): (Vec<f64>, Vec<f64>) = fits.iter().filter_map(|[ours, theirs]| Some((ours.0?, theirs.0?))).unzip();
         outcomes.push(Outcome {
             label,
@@ -110,9 +103,9 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
             },
         });
     }
-    let mut findings = findings(bench, &outcomes);
-    findings.notes.extend(skipped);
-    Ok(findings)
+    let mut found = found(&outcomes);
+    found.notes.extend(skipped);
+    Ok(found)
 }
 
 /// Situations with their scenes: names, and where the model misses nothing and where it does.
@@ -144,7 +137,7 @@ fn cells(base: &Scene) -> Vec<(String, Scene, Situation)> {
     cells
 }
 
-fn findings(bench: &Bench<'_>, outcomes: &[Outcome]) -> Findings {
+fn found(outcomes: &[Outcome]) -> Found {
     let percent = |share: f64| 100.0 * share;
     let claims = outcomes
         .iter()
@@ -187,12 +180,12 @@ fn findings(bench: &Bench<'_>, outcomes: &[Outcome]) -> Findings {
         summary(true)
     );
     let rows = outcomes.iter().map(|outcome| {
-        let [low, high] = outcome.measured.and_then(|mean| mean.interval95).unwrap_or([f64::NAN; 2]);
+        let [measured, low, high] = with_ends(outcome.measured).map(percent);
         let numbers = vec![
             percent(outcome.predicted),
-            outcome.measured.map_or(f64::NAN, |mean| percent(mean.mean)),
-            percent(low),
-            percent(high),
+            measured,
+            low,
+            high,
             percent(outcome.possible),
             outcome.predicted_random_mm,
             outcome.random_mm.map_or(f64::NAN, |mean| mean.mean),
@@ -218,15 +211,7 @@ fn findings(bench: &Bench<'_>, outcomes: &[Outcome]) -> Findings {
         panel = panel.with(Series::new(name, Kind::Estimates(points.collect())));
     }
     panel = panel.with(Series::new("as predicted", Kind::Diagonal).colour(Colour::Dark));
-    let fits = outcomes.iter().fold(Tally::default(), |sum, outcome| Tally {
-        fits: sum.fits + outcome.fits.fits,
-        not_converged: sum.not_converged + outcome.fits.not_converged,
-        held: sum.held + outcome.fits.held,
-    });
-    Findings {
-        item: EXPERIMENT.name,
-        place: EXPERIMENT.place,
-        arm: bench.scene.arm.name.clone(),
+    Found {
         claims,
         verdict,
         notes: vec![format!(
@@ -235,7 +220,7 @@ fn findings(bench: &Bench<'_>, outcomes: &[Outcome]) -> Findings {
             Method::default().name(),
             Criterion::default().name()
         )],
-        fits,
+        fits: outcomes.iter().map(|outcome| outcome.fits).sum(),
         data: vec![Data::labelled("advice", &columns, rows.collect())],
         figures: vec![("advice".to_owned(), Figure::new("Predicted and measured gain over random sets", 1).with(panel))],
     }

@@ -11,8 +11,9 @@ use serde::Serialize;
 
 use super::Experiment;
 use super::bench::Bench;
-use super::findings::{Claim, Data, Findings, Tally};
+use super::findings::{Claim, Data, Found, Tally, with_ends};
 use super::situation::{Reach, Sees, Situation};
+use crate::design::DesignError;
 use crate::design::bound::bound;
 use crate::design::candidates::Rules;
 use crate::design::objective::{Models, Objective};
@@ -20,6 +21,7 @@ use crate::design::problem::{Criterion, Method};
 use crate::design::search::{Task, search};
 use crate::figure::{Axis, Colour, Estimate, Figure, Kind, Panel, Series, Shade};
 use crate::lab::trial::Trial;
+use crate::progress::Silent;
 use crate::scene::Scene;
 use crate::seed::{derive, stream};
 use crate::session::SessionError;
@@ -61,7 +63,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     place: "beyond the paper",
     about: "method × criterion × situation, judged by held-out error (a quarter of an hour per arm)",
     trials: 100,
-    run: experiment,
+    work: experiment,
 };
 
 /// Methods that choose, the paper's first.
@@ -139,11 +141,9 @@ struct Contender {
     predicted_m: Option<f64>,
 }
 
-/// The bake-off on the arm of `base`. `done` is called after every search and every trial, `total` tells how often that will be.
-///
-/// # Errors
-/// Whatever a step reports.
-pub fn run(base: &Scene, settings: &Settings, done: &(dyn Fn() + Sync)) -> Result<Vec<SituationResult>, SessionError> {
+/// The bake-off on the arm of `bench`. Every search and every trial is told; [`steps`] says how many there will be.
+fn run(bench: &Bench<'_>, settings: &Settings) -> Result<Vec<SituationResult>, SessionError> {
+    let base = bench.scene;
     let mut results = Vec::new();
     for cell in cells() {
         let scene = cell.scene(base);
@@ -155,10 +155,10 @@ pub fn run(base: &Scene, settings: &Settings, done: &(dyn Fn() + Sync)) -> Resul
             if !determined(&models, count) {
                 continue;
             }
-            let contenders = contenders(&cell, base, &models, &rules, settings, done)?;
+            let contenders = contenders(bench, &cell, &models, &rules, settings)?;
             for effects in [false, true] {
                 let situation = Situation { effects, ..cell };
-                let (errors, held) = errors(base, situation, &contenders, &models, settings.trials, done)?;
+                let (errors, held) = errors(bench, situation, &contenders, &models, settings.trials)?;
                 let bound_m = limit.as_ref().map_or(f64::NAN, |limit| limit.least_rms_m(count));
                 results.push(judge(situation, &contenders, &errors, held, bound_m));
             }
@@ -167,9 +167,8 @@ pub fn run(base: &Scene, settings: &Settings, done: &(dyn Fn() + Sync)) -> Resul
     Ok(results)
 }
 
-/// Steps that [`run`] tells of, on an arm on which `feasible` cells can be calibrated.
-#[must_use]
-pub fn steps(base: &Scene, settings: &Settings) -> u64 {
+/// Steps that [`run`] tells of.
+fn steps(base: &Scene, settings: &Settings) -> usize {
     let sets = settings.methods.len() * settings.criteria.len();
     let of = |cell: Situation| -> usize {
         let scene = cell.scene(base);
@@ -177,7 +176,7 @@ pub fn steps(base: &Scene, settings: &Settings) -> u64 {
         let feasible = |count: &&usize| **count * information.rows_per_pose() >= information.rank();
         settings.counts.iter().filter(feasible).count()
     };
-    cells().map(|cell| of(cell) * (sets + 2 * settings.trials)).sum::<usize>() as u64
+    cells().map(|cell| of(cell) * (sets + 2 * settings.trials)).sum()
 }
 
 /// Every combination of sensor and reach, without effects.
@@ -194,33 +193,29 @@ fn determined(models: &Models, count: usize) -> bool {
 }
 
 fn contenders(
+    bench: &Bench<'_>,
     cell: &Situation,
-    base: &Scene,
     models: &Models,
     rules: &Rules<'_>,
     settings: &Settings,
-    done: &(dyn Fn() + Sync),
 ) -> Result<Vec<Contender>, SessionError> {
+    let base = bench.scene;
     let joints = base.arm.joint_count();
     let label = |what: &str| format!("bake_off/{}/{}/{what}", cell.words(), cell.count);
     let pairs: Vec<(Method, Criterion)> =
         settings.methods.iter().flat_map(|method| settings.criteria.iter().map(|criterion| (*method, *criterion))).collect();
     type Chosen = (Option<(Method, Criterion)>, Vec<f64>);
-    let chosen: Vec<Chosen> = pairs
-        .into_par_iter()
-        .map(|(method, criterion)| {
-            let objective = Objective::new(models, criterion, joints);
-            // A swarm makes as many iterations as the budget lets it.
-            let mut swarm = base.design.swarm.clone();
-            swarm.iterations = usize::try_from(settings.budget).unwrap_or(usize::MAX) / swarm.particles.max(1);
-            let task = Task::new(rules, &objective, cell.count, settings.budget, POOL);
-            let mut stream = stream(base.seed, &label(&format!("{}/{}", method.name(), criterion.name())));
-            let found = search(method, &task, &swarm, &mut stream, &mut |_| Ok(()));
-            done();
-            found.map(|found| (Some((method, criterion)), found.configurations))
-        })
-        .collect::<Result<_, _>>()
-        .map_err(crate::design::DesignError::from)?;
+    let chosen: Vec<Chosen> = bench.parts(pairs.len(), |number| {
+        let (method, criterion) = pairs[number];
+        let objective = Objective::new(models, criterion, joints);
+        // A swarm makes as many iterations as the budget lets it.
+        let mut swarm = base.design.swarm.clone();
+        swarm.iterations = usize::try_from(settings.budget).unwrap_or(usize::MAX) / swarm.particles.max(1);
+        let task = Task::new(rules, &objective, cell.count, settings.budget, POOL);
+        let mut stream = stream(base.seed, &label(&format!("{}/{}", method.name(), criterion.name())));
+        let found = search(method, &task, &swarm, &mut stream, &mut Silent).map_err(DesignError::from)?;
+        Ok((Some((method, criterion)), found.configurations))
+    })?;
     let mut sampler = crate::design::candidates::Sampler::new(rules);
     let mut stream = stream(base.seed, &label("random"));
     let random = (0..settings.random_sets)
@@ -244,32 +239,25 @@ fn contenders(
 /// Mean held-out position error of every contender (rows) in every trial, m; NaN where the fit did not converge. And how many fits
 /// held combinations at nominal.
 fn errors(
-    base: &Scene,
+    bench: &Bench<'_>,
     situation: Situation,
     contenders: &[Contender],
     models: &Models,
     trials: usize,
-    done: &(dyn Fn() + Sync),
 ) -> Result<(Vec<Vec<f64>>, usize), SessionError> {
+    let base = bench.scene;
     let mut scene = situation.scene(base);
     scene.seed = derive(base.seed, situation.count as u64);
     let injected = situation.injected(base);
-    let by_trial: Vec<Vec<(f64, bool)>> = (0..trials)
-        .into_par_iter()
-        .map(|number| {
-            let trial = Trial::new(&scene, &injected, number)?;
-            let errors = contenders
-                .iter()
-                .map(|contender| {
-                    let result = trial.calibrate(&contender.configurations)?;
-                    let held = result.identification.rank < models.information.rank();
-                    Ok((if result.converged { result.after.position_m.mean } else { f64::NAN }, held))
-                })
-                .collect::<Result<Vec<_>, SessionError>>();
-            done();
-            errors
-        })
-        .collect::<Result<_, _>>()?;
+    let by_trial: Vec<Vec<(f64, bool)>> = bench.parts(trials, |number| {
+        let trial = Trial::new(&scene, &injected, number)?;
+        let errors = contenders.iter().map(|contender| {
+            let result = trial.calibrate(&contender.configurations)?;
+            let held = result.identification.rank < models.information.rank();
+            Ok((if result.converged { result.after.position_m.mean } else { f64::NAN }, held))
+        });
+        errors.collect()
+    })?;
     let held = by_trial.iter().flatten().filter(|(_, held)| *held).count();
     let of = |contender: usize| by_trial.iter().map(|errors| errors[contender].0).collect();
     Ok(((0..contenders.len()).map(of).collect(), held))
@@ -380,10 +368,10 @@ const WORST_PERCENT: f64 = -50.0;
 /// What the paper chooses by.
 const PAPER: (Method, Criterion) = (Method::Pso, Criterion::Comprehensive);
 
-fn experiment(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
+fn experiment(bench: &Bench<'_>, trials: usize) -> Result<Found, SessionError> {
     let settings = Settings { trials, ..Settings::default() };
-    bench.watcher.begin("bake-off", usize::try_from(steps(bench.scene, &settings)).unwrap_or(usize::MAX));
-    let results = run(bench.scene, &settings, &|| bench.watcher.step())?;
+    bench.progress.begin("bake-off", steps(bench.scene, &settings))?;
+    let results = run(bench, &settings)?;
     let ours = (Method::default(), Criterion::default());
     let everywhere = mean_gains(&results, |_| true);
     let gain_of = |gains: &BTreeMap<(Method, Criterion), f64>, key| 100.0 * gains.get(&key).copied().unwrap_or(f64::NAN);
@@ -441,10 +429,7 @@ fn experiment(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError
             .sum(),
         held: results.iter().map(|result| result.held).sum(),
     };
-    Ok(Findings {
-        item: EXPERIMENT.name,
-        place: EXPERIMENT.place,
-        arm: bench.scene.arm.name.clone(),
+    Ok(Found {
         claims: claims(&results, ours),
         verdict,
         notes,
@@ -472,11 +457,7 @@ fn claims(results: &[SituationResult], ours: (Method, Criterion)) -> Vec<Claim> 
 
 fn data(results: &[SituationResult]) -> Vec<Data> {
     let name = |situation: &Situation| vec![situation.words(), situation.count.to_string()];
-    let missing = |mean: Option<Mean>, factor: f64| {
-        let mean = mean.map(|mean| mean.times(factor));
-        let [low, high] = mean.and_then(|mean| mean.interval95).unwrap_or([f64::NAN; 2]);
-        [mean.map_or(f64::NAN, |mean| mean.mean), low, high]
-    };
+    let missing = |mean: Option<Mean>, factor: f64| with_ends(mean.map(|mean| mean.times(factor)));
     let mut choices = Vec::new();
     let mut correlations = Vec::new();
     for result in results {

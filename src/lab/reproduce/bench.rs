@@ -2,6 +2,8 @@
 
 use std::sync::OnceLock;
 
+use rayon::prelude::*;
+
 use super::findings::Tally;
 use super::limits::Limits;
 use crate::design::DesignError;
@@ -11,6 +13,7 @@ use crate::design::problem::{Criterion, Method};
 use crate::design::search::{Found, SearchReport, Task, search};
 use crate::identification::outcome::{Errors, Residual, Summary};
 use crate::lab::trial::Trial;
+use crate::progress::Steps;
 use crate::quality::JacobianScaling;
 use crate::scene::Scene;
 use crate::seed::stream;
@@ -27,24 +30,14 @@ pub(super) const DEG: f64 = 180.0 / std::f64::consts::PI;
 pub(super) const SCALINGS: [(JacobianScaling, &str); 3] =
     [(JacobianScaling::Si, "si"), (JacobianScaling::PerPose, "per_pose"), (JacobianScaling::Columns, "columns")];
 
-/// Whoever is told how far an experiment is.
-pub trait Watcher: Sync {
-    /// A part of so many steps begins.
-    fn begin(&self, what: &'static str, steps: usize);
-    /// One of them is done.
-    fn step(&self);
-    /// Something for people that no result depends on, such as a time.
-    fn remark(&self, text: &str);
-}
-
 /// An arm under experiment.
 pub struct Bench<'a> {
     /// The scene: arm, sensor, plan and problem.
     pub scene: &'a Scene,
     /// What is injected.
     pub injected: &'a Injected,
-    /// Whoever is told.
-    pub watcher: &'a dyn Watcher,
+    /// Is told how far the experiments are.
+    pub progress: &'a Steps,
     /// What no choice can go beyond, for the scene as it is.
     pub limits: Limits,
     models: [OnceLock<Models>; 3],
@@ -54,8 +47,34 @@ pub struct Bench<'a> {
 impl<'a> Bench<'a> {
     /// Nothing is computed yet.
     #[must_use]
-    pub fn new(scene: &'a Scene, injected: &'a Injected, watcher: &'a dyn Watcher) -> Self {
-        Bench { scene, injected, watcher, limits: Limits::default(), models: Default::default(), optimum: OnceLock::new() }
+    pub fn new(scene: &'a Scene, injected: &'a Injected, progress: &'a Steps) -> Self {
+        Bench { scene, injected, progress, limits: Limits::default(), models: Default::default(), optimum: OnceLock::new() }
+    }
+
+    /// Makes `count` trials of `what` side by side, as [`Bench::parts`] does.
+    pub(super) fn trials<T: Send>(
+        &self,
+        what: &'static str,
+        count: usize,
+        trial: impl Fn(usize) -> Result<T, SessionError> + Sync,
+    ) -> Result<Vec<T>, SessionError> {
+        self.progress.begin(what, count)?;
+        self.parts(count, trial)
+    }
+
+    /// Makes so many parts of what has begun side by side, each a function of its number alone; what came out in the order of the
+    /// numbers.
+    pub(super) fn parts<T: Send>(
+        &self,
+        count: usize,
+        part: impl Fn(usize) -> Result<T, SessionError> + Sync,
+    ) -> Result<Vec<T>, SessionError> {
+        let told = |number| {
+            let made = part(number)?;
+            self.progress.done()?;
+            Ok(made)
+        };
+        (0..count).into_par_iter().map(told).collect()
     }
 
     /// Models of the scene.
@@ -188,11 +207,8 @@ pub(super) fn orientation(errors: &Errors, get: impl Fn(&Summary) -> f64) -> f64
 
 /// Counts how fits ended.
 pub(super) fn tally<'f>(fits: impl IntoIterator<Item = &'f Fit>) -> Tally {
-    fits.into_iter().fold(Tally::default(), |tally, fit| Tally {
-        fits: tally.fits + 1,
-        not_converged: tally.not_converged + usize::from(!fit.converged),
-        held: tally.held + usize::from(fit.held),
-    })
+    let one = |fit: &Fit| Tally { fits: 1, not_converged: usize::from(!fit.converged), held: usize::from(fit.held) };
+    fits.into_iter().map(one).sum()
 }
 
 /// Mean over the fits that converged; `None` where there is none, or nothing to be had from them.

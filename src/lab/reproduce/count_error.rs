@@ -3,11 +3,9 @@
 //! Random sets, nested within a trial. Beside the fits stands what their noise lets expect (first order, no fit), and the least that
 //! any choice of as many configurations can leave.
 
-use rayon::prelude::*;
-
 use super::Experiment;
 use super::bench::{Bench, DEG, Fit, MM, fewest, mean, mean_of, orientation, plain, tally};
-use super::findings::{Claim, Data, Findings};
+use super::findings::{Claim, Data, Found, with_ends};
 use super::pictures::band;
 use super::published::Published;
 use crate::design::candidates::{Rules, Sampler};
@@ -16,7 +14,7 @@ use crate::lab::trial::Trial;
 use crate::quality::prediction::Prediction;
 use crate::seed::stream;
 use crate::session::SessionError;
-use crate::statistics::Mean;
+use crate::statistics::{Mean, nearest_rank};
 
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -24,7 +22,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     place: "Table 4, Fig. 11",
     about: "held-out error against the number of configurations",
     trials: 100,
-    run,
+    work: run,
 };
 
 /// Numbers of configurations beside those of the table, in equal ratios.
@@ -38,7 +36,7 @@ struct Point {
     predicted: Option<Prediction>,
 }
 
-fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
+fn run(bench: &Bench<'_>, trials: usize) -> Result<Found, SessionError> {
     let published = Published::get().count_error;
     let (scene, arm, models) = (bench.scene, &bench.scene.arm, bench.models()?);
     let joint_count = arm.joint_count();
@@ -53,22 +51,16 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
     counts.sort_unstable();
     counts.dedup();
 
-    bench.watcher.begin("calibrating", trials);
-    let done: Vec<Vec<Point>> = (0..trials)
-        .into_par_iter()
-        .map(|number| -> Result<Vec<Point>, SessionError> {
-            let trial = Trial::new(scene, bench.injected, number)?;
-            let all = Sampler::new(&rules).draw(&mut stream(trial.seed(), "count-error"), last)?;
-            let points = counts.iter().map(|count| {
-                let set = &all[..count * joint_count];
-                let fit = Fit::new(&trial, set, models.information.rank())?;
-                Ok(Point { fit, predicted: models.predict(set, joint_count) })
-            });
-            let points = points.collect::<Result<_, SessionError>>()?;
-            bench.watcher.step();
-            Ok(points)
-        })
-        .collect::<Result<_, _>>()?;
+    let done: Vec<Vec<Point>> = bench.trials("calibrating", trials, |number| {
+        let trial = Trial::new(scene, bench.injected, number)?;
+        let all = Sampler::new(&rules).draw(&mut stream(trial.seed(), "count-error"), last)?;
+        let points = counts.iter().map(|count| {
+            let set = &all[..count * joint_count];
+            let fit = Fit::new(&trial, set, models.information.rank())?;
+            Ok(Point { fit, predicted: models.predict(set, joint_count) })
+        });
+        points.collect()
+    })?;
 
     let rows: Vec<Row> = counts
         .iter()
@@ -129,8 +121,9 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
     // The paper's numbers are of single calibrations: they are compared with those, not with the interval of our mean.
     let inside = published.row.iter().filter(|published| {
         let Some(index) = counts.iter().position(|count| *count == published.configurations) else { return false };
-        let fits = done.iter().map(|points| &points[index].fit).filter(|fit| fit.converged);
-        central(fits.map(Fit::position_mm).collect()).is_some_and(|[low, high]| (low..=high).contains(&published.position_mm))
+        let errors = || done.iter().map(|points| &points[index].fit).filter(|fit| fit.converged).map(Fit::position_mm);
+        let [low, high] = [0.025, 0.975].map(|share| nearest_rank(errors(), share).unwrap_or(f64::NAN));
+        (low..=high).contains(&published.position_mm)
     });
     let fall: Vec<String> = published
         .row
@@ -158,10 +151,7 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
     if first > table[0] {
         notes.push(format!("Fewer than {first} configurations do not determine the parameters."));
     }
-    Ok(Findings {
-        item: EXPERIMENT.name,
-        place: EXPERIMENT.place,
-        arm: arm.name.clone(),
+    Ok(Found {
         claims,
         verdict,
         notes,
@@ -182,13 +172,6 @@ struct Row {
     predicted_orientation: Option<Mean>,
     bound: Option<f64>,
     not_converged: usize,
-}
-
-/// Ends of the middle 95 % of the values; `None` of none.
-fn central(mut values: Vec<f64>) -> Option<[f64; 2]> {
-    values.sort_by(f64::total_cmp);
-    let last = values.len().checked_sub(1)?;
-    Some([0.025, 0.975].map(|share| values[libm::round(share * last as f64) as usize]))
 }
 
 /// Least-squares slope; `None` of fewer than two points.
@@ -255,25 +238,11 @@ fn data(rows: &[Row]) -> Data {
         "attitude_rms_predicted_deg",
         "not_converged",
     ];
-    let value = |mean: Option<Mean>| mean.map_or(f64::NAN, |mean| mean.mean);
-    let ends = |mean: Option<Mean>| mean.and_then(|mean| mean.interval95).unwrap_or([f64::NAN; 2]);
+    let value = |mean: Option<Mean>| with_ends(mean)[0];
     let rows = rows.iter().map(|row| {
-        let (position, orientation) = (ends(row.position), ends(row.orientation));
-        vec![
-            row.count as f64,
-            value(row.position),
-            position[0],
-            position[1],
-            value(row.position_rms),
-            value(row.predicted_position),
-            row.bound.unwrap_or(f64::NAN),
-            value(row.orientation),
-            orientation[0],
-            orientation[1],
-            value(row.orientation_rms),
-            value(row.predicted_orientation),
-            row.not_converged as f64,
-        ]
+        let position = [value(row.position_rms), value(row.predicted_position), row.bound.unwrap_or(f64::NAN)];
+        let orientation = [value(row.orientation_rms), value(row.predicted_orientation), row.not_converged as f64];
+        [&[row.count as f64], with_ends(row.position).as_slice(), &position, &with_ends(row.orientation), &orientation].concat()
     });
     Data::new("count-error", &columns, rows.collect())
 }
@@ -286,11 +255,5 @@ mod tests {
     fn a_straight_line_has_its_slope() {
         assert!((slope(&[[0.0, 1.0], [1.0, 0.5], [4.0, -1.0]]).unwrap() + 0.5).abs() < 1e-15);
         assert!(slope(&[[1.0, 1.0]]).is_none() && slope(&[]).is_none());
-    }
-
-    #[test]
-    fn the_middle_leaves_out_the_ends() {
-        assert_eq!(central((0..=200).rev().map(f64::from).collect()), Some([5.0, 195.0]));
-        assert_eq!((central(vec![2.0]), central(Vec::new())), (Some([2.0, 2.0]), None));
     }
 }

@@ -3,11 +3,9 @@
 //! Random sets are nested: that of m configurations is the first m of one draw. The paper does not say how the Jacobian is scaled; the
 //! growth that it prints depends on that, so all three scalings are computed from the same configurations.
 
-use rayon::prelude::*;
-
 use super::Experiment;
 use super::bench::{Bench, SCALINGS, fewest, mean_of, plain};
-use super::findings::{Claim, Data, Findings, Tally};
+use super::findings::{Claim, Data, Found, Tally, with_ends};
 use super::pictures::band;
 use super::published::Published;
 use crate::design::candidates::{Rules, Sampler};
@@ -27,7 +25,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     place: "Figs. 9 and 10",
     about: "indexes against the number of configurations",
     trials: 10,
-    run,
+    work: run,
 };
 
 /// The gradient of O_C at m is taken from m over this factor to m times it.
@@ -38,7 +36,7 @@ const INDEXES: [&str; 4] = ["O1", "O2", "O3", "O_C"];
 /// O1, O2, O3 and O_C under each scaling, for every m of one trial.
 type Curve = Vec<[[f64; 4]; 3]>;
 
-fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
+fn run(bench: &Bench<'_>, trials: usize) -> Result<Found, SessionError> {
     let published = Published::get().count_index;
     let arm = &bench.scene.arm;
     let models = [bench.models_scaled(SCALINGS[0].0)?, bench.models_scaled(SCALINGS[1].0)?, bench.models_scaled(SCALINGS[2].0)?];
@@ -47,17 +45,11 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
     let first = first.max(fewest(models[0]));
     let counts: Vec<usize> = (first..=last).collect();
 
-    bench.watcher.begin("indexes", trials);
-    let curves: Vec<Curve> = (0..trials)
-        .into_par_iter()
-        .map(|number| -> Result<Curve, SessionError> {
-            let seed = derive(bench.scene.seed, number as u64);
-            let set = Sampler::new(&rules).draw(&mut stream(seed, "count-index"), last)?;
-            let curve = curve(&models, &set, arm.joint_count(), first);
-            bench.watcher.step();
-            Ok(curve)
-        })
-        .collect::<Result<_, _>>()?;
+    let curves: Vec<Curve> = bench.trials("indexes", trials, |number| {
+        let seed = derive(bench.scene.seed, number as u64);
+        let set = Sampler::new(&rules).draw(&mut stream(seed, "count-index"), last)?;
+        Ok(curve(&models, &set, arm.joint_count(), first))
+    })?;
 
     let at = |count: usize| count.max(first) - first;
     let mean = |scaling: usize, index: usize, count: usize| mean_of(curves.iter().map(|curve| curve[at(count)][scaling][index]));
@@ -113,10 +105,7 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
     if first > published.configurations[0] {
         notes.push(format!("The growth starts at m = {first}: fewer configurations do not determine the parameters."));
     }
-    Ok(Findings {
-        item: EXPERIMENT.name,
-        place: EXPERIMENT.place,
-        arm: arm.name.clone(),
+    Ok(Found {
         claims,
         verdict,
         notes,
@@ -210,9 +199,7 @@ fn data(counts: &[usize], mean: &MeanAt<'_>) -> Data {
         let mut row = vec![*count as f64];
         for scaling in 0..3 {
             for index in 0..4 {
-                let found = mean(scaling, index, *count);
-                let [low, high] = found.and_then(|mean| mean.interval95).unwrap_or([f64::NAN; 2]);
-                row.extend([found.map_or(f64::NAN, |mean| mean.mean), low, high]);
+                row.extend(with_ends(mean(scaling, index, *count)));
             }
         }
         row

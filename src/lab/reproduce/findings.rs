@@ -14,6 +14,14 @@ pub struct Findings {
     pub place: &'static str,
     /// Name of the arm.
     pub arm: String,
+    /// What was found.
+    #[serde(flatten)]
+    pub found: Found,
+}
+
+/// What came out of an experiment.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Found {
     /// The published numbers beside ours.
     pub claims: Vec<Claim>,
     /// Whether the paper's statement holds here, in a sentence with the number that says so.
@@ -39,6 +47,16 @@ pub struct Tally {
     pub not_converged: usize,
     /// Of them, those that held combinations at nominal because the set does not show them; they are in the means.
     pub held: usize,
+}
+
+impl std::iter::Sum for Tally {
+    fn sum<I: Iterator<Item = Tally>>(tallies: I) -> Tally {
+        tallies.fold(Tally::default(), |sum, one| Tally {
+            fits: sum.fits + one.fits,
+            not_converged: sum.not_converged + one.not_converged,
+            held: sum.held + one.held,
+        })
+    }
 }
 
 /// A number of the paper and ours.
@@ -72,6 +90,17 @@ impl Claim {
     pub fn bounded(self, bound: Option<f64>) -> Self {
         Claim { bound, ..self }
     }
+}
+
+/// A mean and the ends of its interval, as three columns of a table; NaN for what there is not.
+pub(super) fn with_ends(mean: Option<Mean>) -> [f64; 3] {
+    let [low, high] = mean.and_then(|mean| mean.interval95).unwrap_or([f64::NAN; 2]);
+    [mean.map_or(f64::NAN, |mean| mean.mean), low, high]
+}
+
+/// One of a flag that is set, as a column of a table.
+pub(super) fn flag(is_set: bool) -> f64 {
+    f64::from(u8::from(is_set))
 }
 
 /// A table of numbers for CSV.

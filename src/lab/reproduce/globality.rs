@@ -7,12 +7,11 @@
 //! that their dispersion is that of A.
 
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 use super::Experiment;
 use super::arms::narrowed;
 use super::bench::{Bench, DEG, Fit, MM, mean, mean_of, orientation, plain, tally};
-use super::findings::{Claim, Data, Findings};
+use super::findings::{Claim, Data, Found, flag};
 use super::pictures::{end_points, in_workspace, reach};
 use super::published::{Extremes, Published};
 use crate::arm::ChainAt;
@@ -33,7 +32,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     place: "Tables 2 and 3, Figs. 5–7",
     about: "sets of little and of much dispersion",
     trials: 20,
-    run,
+    work: run,
 };
 
 /// Sets over which a mean dispersion is taken to choose the ranges of A.
@@ -67,7 +66,7 @@ struct Trialled {
     fits: [Fit; 3],
 }
 
-fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
+fn run(bench: &Bench<'_>, trials: usize) -> Result<Found, SessionError> {
     let published = Published::get().globality;
     let (scene, arm, models) = (bench.scene, &bench.scene.arm, bench.models()?);
     let (count, joint_count) = (published.configurations, arm.joint_count());
@@ -87,32 +86,26 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
     let narrow = Rules::measurable(&narrow_arm, &scene.sensor);
     let (ball, share, at_a) = ball(&rules, &narrow, scene.seed, count, target)?;
 
-    bench.watcher.begin("globality", trials);
-    let done: Vec<Trialled> = (0..trials)
-        .into_par_iter()
-        .map(|number| -> Result<Trialled, SessionError> {
-            let trial = Trial::new(scene, bench.injected, number)?;
-            let draw = |name: &str| stream(trial.seed(), &format!("globality/{name}"));
-            let sets = [
-                Sampler::new(&narrow).draw(&mut draw("a"), count)?,
-                Sampler::new(&rules).draw(&mut draw("b"), count)?,
-                in_ball(&rules, &ball, &mut draw("c"), count),
-            ];
-            let fit = |set: &Vec<f64>| Fit::new(&trial, set, models.information.rank());
-            let fits = [fit(&sets[0])?, fit(&sets[1])?, fit(&sets[2])?];
-            let mut scratch = Scratch::default();
-            let trialled = Trialled {
-                indexes: [0, 1, 2].map(|set: usize| models.evaluator.evaluate(&sets[set], &mut scratch)),
-                other_evenness: [0, 1, 2].map(|set: usize| other_grid.evenness(&end_points(arm, &sets[set]))),
-                predicted_m: [0, 1, 2]
-                    .map(|set: usize| models.predict(&sets[set], joint_count).map_or(f64::NAN, |found| found.position_rms_m)),
-                fits,
-                sets,
-            };
-            bench.watcher.step();
-            Ok(trialled)
+    let done: Vec<Trialled> = bench.trials("globality", trials, |number| {
+        let trial = Trial::new(scene, bench.injected, number)?;
+        let draw = |name: &str| stream(trial.seed(), &format!("globality/{name}"));
+        let sets = [
+            Sampler::new(&narrow).draw(&mut draw("a"), count)?,
+            Sampler::new(&rules).draw(&mut draw("b"), count)?,
+            in_ball(&rules, &ball, &mut draw("c"), count),
+        ];
+        let fit = |set: &Vec<f64>| Fit::new(&trial, set, models.information.rank());
+        let fits = [fit(&sets[0])?, fit(&sets[1])?, fit(&sets[2])?];
+        let mut scratch = Scratch::default();
+        Ok(Trialled {
+            indexes: [0, 1, 2].map(|set: usize| models.evaluator.evaluate(&sets[set], &mut scratch)),
+            other_evenness: [0, 1, 2].map(|set: usize| other_grid.evenness(&end_points(arm, &sets[set]))),
+            predicted_m: [0, 1, 2]
+                .map(|set: usize| models.predict(&sets[set], joint_count).map_or(f64::NAN, |found| found.position_rms_m)),
+            fits,
+            sets,
         })
-        .collect::<Result<_, _>>()?;
+    })?;
 
     let over = |set: usize, get: &dyn Fn(&Trialled, usize) -> f64| mean_of(done.iter().map(|trial| get(trial, set)));
     let fits = |set: usize| done.iter().map(move |trial| &trial.fits[set]);
@@ -186,10 +179,7 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
         figures.push((format!("globality-points-{}", NAMES[set].to_lowercase()), figure));
     }
     figures.push(("globality-residuals".to_owned(), residual_figure(&arm.name, &done[0])));
-    Ok(Findings {
-        item: EXPERIMENT.name,
-        place: EXPERIMENT.place,
-        arm: arm.name.clone(),
+    Ok(Found {
         claims,
         verdict,
         notes: vec![
@@ -371,7 +361,7 @@ fn data(done: &[Trialled]) -> Data {
                 orientation(&fit.before, |summary| summary.mean),
                 fit.position_mm(),
                 fit.orientation_deg(),
-                f64::from(u8::from(fit.converged)),
+                flag(fit.converged),
             ];
             (vec![NAMES[set].to_owned()], numbers)
         })

@@ -7,12 +7,10 @@
 //!
 //! The same is then done where choosing can gain most: few configurations, positions only, joints that move little.
 
-use rayon::prelude::*;
-
 use super::Experiment;
 use super::arms::cut;
 use super::bench::{Bench, Choice, DEG, Fit, MM, choose, fewest, mean, mean_of, percent, plain, tally};
-use super::findings::{Claim, Data, Findings};
+use super::findings::{Claim, Data, Found, flag};
 use super::limits::Limits;
 use super::published::Published;
 use crate::design::candidates::{Rules, Sampler};
@@ -31,7 +29,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     place: "Table 7, Fig. 16, abstract",
     about: "what choosing the configurations is worth",
     trials: 100,
-    run,
+    work: run,
 };
 
 /// Values of the criterion for the search on I-optimality, in budgets of the swarm.
@@ -67,7 +65,7 @@ struct Situation {
     least: Option<f64>,
 }
 
-fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
+fn run(bench: &Bench<'_>, trials: usize) -> Result<Found, SessionError> {
     let published = Published::get().headline;
     let scene = bench.scene;
     let models = bench.models()?;
@@ -77,7 +75,7 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
     let position_models = Models::new(&positions.request())?;
     let (few, fewest_positions) = (FEW.max(fewest(models)), fewest(&position_models) + 1);
 
-    bench.watcher.begin("calibrating", 4 * (trials + 2));
+    bench.progress.begin("calibrating", 4 * (trials + 2))?;
     let poses = Cell {
         scene,
         models,
@@ -156,20 +154,17 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
             ));
         }
     }
-    let arm = scene.arm.name.clone();
-    Ok(Findings {
-        item: EXPERIMENT.name,
-        place: EXPERIMENT.place,
+    let arm = &scene.arm.name;
+    Ok(Found {
         claims,
         verdict,
         notes,
         fits: tally(situations.iter().flat_map(|situation| &situation.fits).flatten()),
         data: vec![data(&situations)],
         figures: vec![
-            ("headline-errors".to_owned(), error_figure(&arm, &situations[0])),
-            ("headline-gains".to_owned(), gain_figure(&arm, &situations, paper)),
+            ("headline-errors".to_owned(), error_figure(arm, &situations[0])),
+            ("headline-gains".to_owned(), gain_figure(arm, &situations, paper)),
         ],
-        arm,
     })
 }
 
@@ -193,26 +188,22 @@ fn compare(
         Some(optimum) => optimum.to_vec(),
         None => search(Method::Pso, Criterion::Comprehensive, budget)?,
     };
-    bench.watcher.step();
+    bench.progress.done()?;
     let i_optimal = search(Method::CoordinateExchange, Criterion::IOptimality, BUDGETS * budget)?;
-    bench.watcher.step();
+    bench.progress.done()?;
 
     let rules = Rules::measurable(&scene.arm, &scene.sensor);
     let rank = models.information.rank();
-    let done: Vec<([Fit; 3], [f64; 2])> = (0..trials)
-        .into_par_iter()
-        .map(|number| -> Result<_, SessionError> {
-            let trial = Trial::new(scene, bench.injected, number)?;
-            let random = Sampler::new(&rules).draw(&mut stream(trial.seed(), &format!("headline/random/{count}")), count)?;
-            let fits =
-                [Fit::new(&trial, &random, rank)?, Fit::new(&trial, &comprehensive, rank)?, Fit::new(&trial, &i_optimal, rank)?];
-            let predicted = models
-                .predict(&random, joint_count)
-                .map_or([f64::NAN; 2], |found| [MM * found.position_rms_m, DEG * found.orientation_rms_rad]);
-            bench.watcher.step();
-            Ok((fits, predicted))
-        })
-        .collect::<Result<_, _>>()?;
+    let done: Vec<([Fit; 3], [f64; 2])> = bench.parts(trials, |number| {
+        let trial = Trial::new(scene, bench.injected, number)?;
+        let random = Sampler::new(&rules).draw(&mut stream(trial.seed(), &format!("headline/random/{count}")), count)?;
+        let fits =
+            [Fit::new(&trial, &random, rank)?, Fit::new(&trial, &comprehensive, rank)?, Fit::new(&trial, &i_optimal, rank)?];
+        let predicted = models
+            .predict(&random, joint_count)
+            .map_or([f64::NAN; 2], |found| [MM * found.position_rms_m, DEG * found.orientation_rms_rad]);
+        Ok((fits, predicted))
+    })?;
     let random = |kind: usize| mean_of(done.iter().map(|(_, predicted)| predicted[kind]));
     let single = |set: &[f64], kind: usize| {
         models
@@ -340,7 +331,6 @@ fn data(situations: &[Situation]) -> Data {
     for situation in situations {
         for (trial, fits) in situation.fits.iter().enumerate() {
             for (set, fit) in fits.iter().enumerate() {
-                let flag = |flag: bool| f64::from(u8::from(flag));
                 let numbers = vec![
                     situation.count as f64,
                     trial as f64,

@@ -1,6 +1,7 @@
 //! What `kincal reproduce` repeats: every table and figure of Chen et al. 2019, and what goes beyond them.
 //!
-//! One file per experiment; each returns [`findings::Findings`]: the paper's numbers beside ours.
+//! One file per experiment. Each computes its trials side by side ([`Bench::trials`]) and returns what it [`Found`]: the paper's numbers
+//! beside ours, a verdict, the data and the figures. [`Experiment::run`] says of which experiment and arm that is.
 
 pub mod advice;
 pub mod arms;
@@ -21,7 +22,7 @@ pub mod situation;
 
 use crate::session::SessionError;
 use bench::Bench;
-use findings::Findings;
+use findings::{Findings, Found};
 
 /// An experiment by its name.
 pub struct Experiment {
@@ -34,7 +35,18 @@ pub struct Experiment {
     /// Trials if nobody asks for another number: the paper's, or enough for a decent interval.
     pub trials: usize,
     /// Makes as many trials.
-    pub run: fn(&Bench<'_>, usize) -> Result<Findings, SessionError>,
+    work: fn(&Bench<'_>, usize) -> Result<Found, SessionError>,
+}
+
+impl Experiment {
+    /// Makes as many trials on the arm of `bench`.
+    ///
+    /// # Errors
+    /// Whatever a trial reports.
+    pub fn run(&self, bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
+        let found = (self.work)(bench, trials)?;
+        Ok(Findings { item: self.name, place: self.place, arm: bench.scene.arm.name.clone(), found })
+    }
 }
 
 /// Experiments that go beyond the paper: each is asked for by its name.

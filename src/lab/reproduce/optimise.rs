@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use super::Experiment;
 use super::bench::{Bench, Choice, MM, SCALINGS, choose, mean_of, plain};
-use super::findings::{Claim, Data, Findings, Tally};
+use super::findings::{Claim, Data, Found, Tally};
 use super::pictures::{end_points, in_workspace, reach};
 use super::published::Published;
 use crate::design::problem::{Criterion, Method};
@@ -17,8 +17,13 @@ use crate::figure::{Axis, Figure, Kind, Panel, Series};
 use crate::session::SessionError;
 
 /// The experiment; a trial is a run of the swarm.
-pub const EXPERIMENT: Experiment =
-    Experiment { name: "optimise", place: "Table 5, Fig. 12", about: "the paper's swarm and other methods", trials: 5, run };
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "optimise",
+    place: "Table 5, Fig. 12",
+    about: "the paper's swarm and other methods",
+    trials: 5,
+    work: run,
+};
 
 /// Budget of methods at leisure, in budgets of the swarm.
 const LEISURE: u64 = 10;
@@ -37,7 +42,7 @@ struct Searched {
     history: Vec<(u64, f64)>,
 }
 
-fn run(bench: &Bench<'_>, runs: usize) -> Result<Findings, SessionError> {
+fn run(bench: &Bench<'_>, runs: usize) -> Result<Found, SessionError> {
     let published = Published::get().optimise;
     let (scene, arm) = (bench.scene, &bench.scene.arm);
     let (count, budget) = (scene.design.count, scene.design.swarm.evaluations());
@@ -48,7 +53,7 @@ fn run(bench: &Bench<'_>, runs: usize) -> Result<Findings, SessionError> {
         (Criterion::IOptimality, LEISURE * budget),
         (Criterion::DOptimality, LEISURE * budget),
     ];
-    bench.watcher.begin("searching", SCALINGS.len() * runs + searches.len() * Method::ALL.len());
+    bench.progress.begin("searching", SCALINGS.len() * runs + searches.len() * Method::ALL.len())?;
 
     let mut claims = Vec::new();
     let mut optima = Vec::new();
@@ -58,7 +63,7 @@ fn run(bench: &Bench<'_>, runs: usize) -> Result<Findings, SessionError> {
             // The first of the scene's own scaling is the optimum that other experiments use.
             let own = number == 0 && scaling == scene.design.jacobian_scaling;
             values.push(if own { bench.optimum()?.value } else { bench.swarm(scaling, number)?.value });
-            bench.watcher.step();
+            bench.progress.done()?;
         }
         let mean = mean_of(values);
         optima.push(format!("{} under `{name}`", plain(mean, 4)));
@@ -89,13 +94,13 @@ fn run(bench: &Bench<'_>, runs: usize) -> Result<Findings, SessionError> {
             let choice = Choice { method, criterion, count, budget };
             let label = format!("optimise/{}/{}", criterion.name(), method.name());
             let (found, evaluations) = choose(scene, models, choice, &label, &mut watch)?;
-            bench.watcher.remark(&format!(
+            bench.progress.remark(format!(
                 "  {}, {}, {budget} values: {:.2} s",
                 criterion.name(),
                 method.name(),
                 start.elapsed().as_secs_f64()
-            ));
-            bench.watcher.step();
+            ))?;
+            bench.progress.done()?;
             searched.push(Searched { method, criterion, budget, evaluations, value: found.value, history });
         }
     }
@@ -141,10 +146,7 @@ fn run(bench: &Bench<'_>, runs: usize) -> Result<Findings, SessionError> {
         swarm(Criterion::Comprehensive).map_or(f64::NAN, |search| search.value),
     );
     let points = end_points(arm, &bench.optimum()?.configurations);
-    Ok(Findings {
-        item: EXPERIMENT.name,
-        place: EXPERIMENT.place,
-        arm: arm.name.clone(),
+    Ok(Found {
         claims,
         verdict,
         notes: vec![

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::Experiment;
 use super::arms::cut;
 use super::bench::{Bench, DEG, Fit, MM, SCALINGS, mean, mean_of, tally};
-use super::findings::{Claim, Data, Findings};
+use super::findings::{Claim, Data, Found, flag};
 use super::published::Published;
 use crate::design::candidates::{Rules, Sampler};
 use crate::design::objective::{Models, Objective, ObjectiveScratch};
@@ -22,8 +22,13 @@ use crate::session::SessionError;
 use crate::statistics::{Mean, rank_correlation};
 
 /// The experiment.
-pub const EXPERIMENT: Experiment =
-    Experiment { name: "quality", place: "Fig. 8", about: "held-out error against O_C and the other indexes", trials: 5, run };
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "quality",
+    place: "Fig. 8",
+    about: "held-out error against O_C and the other indexes",
+    trials: 5,
+    work: run,
+};
 
 /// The indexes, in the order of [`Sample::indexes`]; larger is better for all.
 const INDEXES: [&str; 14] = [
@@ -76,14 +81,14 @@ const I_OPTIMALITY: usize = 12;
 /// Sets of one trial in the order of the ranges.
 type Sets = Vec<Sample>;
 
-fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
+fn run(bench: &Bench<'_>, trials: usize) -> Result<Found, SessionError> {
     let published = Published::get().quality;
     let (scene, arm) = (bench.scene, &bench.scene.arm);
     let ranges: Vec<usize> = (published.narrowest_deg..=published.widest_deg).step_by(published.step_deg).collect();
     let models = [bench.models_scaled(SCALINGS[0].0)?, bench.models_scaled(SCALINGS[1].0)?, bench.models_scaled(SCALINGS[2].0)?];
     let own = bench.models()?;
 
-    bench.watcher.begin("quality", 2 * ranges.len() * trials);
+    bench.progress.begin("quality", 2 * ranges.len() * trials)?;
     let calibrations: Vec<Trial<'_>> =
         (0..trials).map(|number| Trial::new(scene, bench.injected, number)).collect::<Result<_, _>>()?;
     // Work is shared by ranges: narrow and wide ones do not cost the same.
@@ -99,7 +104,7 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
                         let label = format!("quality/{}/{range}", if across { "range" } else { "whole" });
                         let set = Sampler::new(&rules).draw(&mut stream(trial.seed(), &label), published.configurations)?;
                         let fit = Fit::new(trial, &set, own.information.rank())?;
-                        bench.watcher.step();
+                        bench.progress.done()?;
                         Ok(Sample { indexes: indexes(&models, own, &set, arm.joint_count()), fit })
                     })
                     .collect::<Result<Vec<_>, SessionError>>()
@@ -178,10 +183,7 @@ fn run(bench: &Bench<'_>, trials: usize) -> Result<Findings, SessionError> {
     let narrow = tally(across.iter().flatten().map(|sample| &sample.fit));
     let all = tally(across.iter().chain(&within).flatten().map(|sample| &sample.fit));
     let own_name = SCALINGS[own_index].1;
-    Ok(Findings {
-        item: EXPERIMENT.name,
-        place: EXPERIMENT.place,
-        arm: arm.name.clone(),
+    Ok(Found {
         claims,
         verdict,
         notes: vec![
@@ -324,7 +326,6 @@ fn data(name: &str, ranges: &[usize], sets: &[Sets]) -> Data {
         sets.iter().zip(ranges).map(move |(sample, range)| {
             let mut row = vec![trial as f64, if whole { f64::NAN } else { *range as f64 }];
             row.extend(sample.indexes);
-            let flag = |flag: bool| f64::from(u8::from(flag));
             row.extend([
                 sample.fit.position_mm(),
                 sample.fit.orientation_deg(),

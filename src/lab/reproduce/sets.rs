@@ -1,10 +1,8 @@
 //! Chen et al. 2019, section V.C.2.a, Table 6 and Figs. 13–15: dispersion, evenness and O_C of the optimal set against random sets.
 
-use rayon::prelude::*;
-
 use super::Experiment;
 use super::bench::{Bench, mean_of};
-use super::findings::{Claim, Data, Findings, Tally};
+use super::findings::{Claim, Data, Found, Tally};
 use crate::design::candidates::{Rules, Sampler};
 use crate::figure::{Axis, Colour, Figure, Kind, Marker, Panel, Series};
 use crate::quality::Indexes;
@@ -18,7 +16,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     place: "Table 6, Figs. 13–15",
     about: "the optimal set's indexes among random sets'",
     trials: 500,
-    run,
+    work: run,
 };
 
 type Get = fn(&Indexes) -> f64;
@@ -30,22 +28,16 @@ const INDEXES: [(&str, &str, Get); 3] = [
     ("O_C", "Fig. 15", |indexes| indexes.comprehensive),
 ];
 
-fn run(bench: &Bench<'_>, sets: usize) -> Result<Findings, SessionError> {
+fn run(bench: &Bench<'_>, sets: usize) -> Result<Found, SessionError> {
     let (scene, arm, models) = (bench.scene, &bench.scene.arm, bench.models()?);
     let count = scene.design.count;
     let rules = Rules::measurable(arm, &scene.sensor);
-    bench.watcher.begin("random sets", sets);
-    let random: Vec<(Indexes, f64)> = (0..sets)
-        .into_par_iter()
-        .map_init(Scratch::default, |scratch, number| -> Result<_, SessionError> {
-            let seed = derive(scene.seed, number as u64);
-            let set = Sampler::new(&rules).draw(&mut stream(seed, "sets"), count)?;
-            let predicted = models.predict(&set, arm.joint_count()).map_or(f64::NAN, |found| 1e3 * found.position_rms_m);
-            let indexes = models.evaluator.evaluate(&set, scratch);
-            bench.watcher.step();
-            Ok((indexes, predicted))
-        })
-        .collect::<Result<_, _>>()?;
+    let random: Vec<(Indexes, f64)> = bench.trials("random sets", sets, |number| {
+        let seed = derive(scene.seed, number as u64);
+        let set = Sampler::new(&rules).draw(&mut stream(seed, "sets"), count)?;
+        let predicted = models.predict(&set, arm.joint_count()).map_or(f64::NAN, |found| 1e3 * found.position_rms_m);
+        Ok((models.evaluator.evaluate(&set, &mut Scratch::default()), predicted))
+    })?;
     let chosen = bench.optimum()?;
     let optimum = models.evaluator.evaluate(&chosen.configurations, &mut Scratch::default());
     let predicted = models.predict(&chosen.configurations, arm.joint_count()).map(|found| 1e3 * found.position_rms_m);
@@ -99,10 +91,7 @@ fn run(bench: &Bench<'_>, sets: usize) -> Result<Findings, SessionError> {
         row
     });
     let columns = ["set", "dispersion_m2", "evenness", "comprehensive", "position_rms_predicted_mm"];
-    Ok(Findings {
-        item: EXPERIMENT.name,
-        place: EXPERIMENT.place,
-        arm: arm.name.clone(),
+    Ok(Found {
         claims,
         verdict,
         notes: vec![format!(

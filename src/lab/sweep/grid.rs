@@ -1,5 +1,6 @@
 //! The grid of a sweep: which values every axis takes.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::arm::Arm;
@@ -85,7 +86,7 @@ impl Injecting {
 }
 
 /// A cell of the grid.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Cell {
     /// Name of the effect, [`NOTHING`] or [`AS_THE_SCENE`].
     pub effect: String,

@@ -24,9 +24,8 @@ use crate::design;
 use crate::design::problem::Method;
 use crate::effects::Kind;
 use crate::identification::{fit_some, identify_on};
-use crate::lab::reproduce::bench::Watcher;
 use crate::measurement::{Measurement, Role};
-use crate::progress::Silent;
+use crate::progress::{Silent, Steps, Stopped};
 use crate::quality::subspace::Subspace;
 use crate::scene::{Scene, SceneError, SceneFile};
 use crate::seed::derive;
@@ -51,6 +50,9 @@ pub enum SweepError {
     /// The results could not be kept.
     #[error(transparent)]
     Results(#[from] ResultsError),
+    /// Whoever was told stopped it.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }
 
 /// A sweep that is ready: the cells with their chosen configurations.
@@ -83,18 +85,18 @@ impl Sweep {
     ///
     /// # Errors
     /// If a value of the grid does not fit the scene, or no configuration may be measured.
-    pub fn new(file: &SceneFile, injected: &Injected, grid: &Grid, watcher: &dyn Watcher) -> Result<Sweep, SweepError> {
+    pub fn new(file: &SceneFile, injected: &Injected, grid: &Grid, progress: &Steps) -> Result<Sweep, SweepError> {
         let cells = grid.cells();
         let mut sets: BTreeMap<(usize, Method), Chosen> = BTreeMap::new();
         let wanted: std::collections::BTreeSet<_> = cells.iter().map(|cell| (cell.poses, cell.method)).collect();
-        watcher.begin("choosing", wanted.len());
+        progress.begin("choosing", wanted.len())?;
         for (poses, method) in wanted {
             let mut file = file.clone();
             file.set_count(poses)?;
             file.set_method(method)?;
             let chosen = design::design(&file.scene.request(), &mut Silent).map_err(SessionError::from)?.configurations;
             sets.insert((poses, method), (file.scene, chosen));
-            watcher.step();
+            progress.done()?;
         }
         let arm = &file.scene.arm;
         let mut ready = Vec::with_capacity(cells.len());
@@ -136,20 +138,20 @@ impl Sweep {
     ///
     /// # Errors
     /// Whatever a trial or the file reports.
-    pub fn run(&self, trials: Range<u64>, results: &mut Results, watcher: &dyn Watcher) -> Result<(), SweepError> {
+    pub fn run(&self, trials: Range<u64>, results: &mut Results, progress: &Steps) -> Result<(), SweepError> {
         let cells = self.cells.len() as u64;
         let all = trials.start * cells..trials.end * cells;
         let mut next = all.start + results.count();
-        watcher.begin("sweeping", usize::try_from(all.end.saturating_sub(next)).unwrap_or(usize::MAX));
+        progress.begin("sweeping", usize::try_from(all.end.saturating_sub(next)).unwrap_or(usize::MAX))?;
         let batch = (PER_THREAD * rayon::current_num_threads()) as u64;
         while next < all.end {
             let end = (next + batch).min(all.end);
             let records: Vec<Record> = (next..end)
                 .into_par_iter()
                 .map(|item| {
-                    let record = self.trial(item / cells, (item % cells) as usize);
-                    watcher.step();
-                    record
+                    let record = self.trial(item / cells, (item % cells) as usize)?;
+                    progress.done()?;
+                    Ok(record)
                 })
                 .collect::<Result<_, SweepError>>()?;
             results.append(&records)?;

@@ -2,14 +2,15 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::grid::Cell;
 use super::results::{Header, Record};
-use crate::statistics::{Mean, Running};
+use crate::statistics::{Mean, Running, rms};
 
 /// A cell's trials taken together.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CellSummary {
     /// Number of the cell.
     pub cell: usize,
@@ -43,7 +44,7 @@ pub struct CellSummary {
 }
 
 /// A combination in all trials of a cell.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CombinationSummary {
     /// Name of the independent parameter.
     pub name: String,
@@ -158,7 +159,8 @@ impl<'a> Reduction<'a> {
                 })
             })
             .collect();
-        let squares: f64 = combinations.iter().map(|combination| combination.bias_in_standard_errors.powi(2)).sum();
+        let bias = combinations.iter().map(|combination| combination.bias_in_standard_errors);
+        let bias_in_standard_errors = (!combinations.is_empty()).then(|| rms(bias));
         CellSummary {
             cell,
             what: self.header.cells[cell].clone(),
@@ -172,7 +174,7 @@ impl<'a> Reduction<'a> {
             swallowed: sums.swallowed.mean(),
             lambda: sums.lambda.mean(),
             coverage: sums.coverage.mean(),
-            bias_in_standard_errors: (!combinations.is_empty()).then(|| (squares / combinations.len() as f64).sqrt()),
+            bias_in_standard_errors,
             combinations,
         }
     }
