@@ -24,6 +24,8 @@ pub enum Event {
     Identified(Identification),
     /// What causes the rest has been looked for in all readings.
     Diagnosed(Box<Diagnosis>),
+    /// Why the causes could not be looked for.
+    NotDiagnosed(String),
     /// Something worth telling.
     Note(String),
 }

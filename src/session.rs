@@ -8,6 +8,7 @@ use crate::design::search::SearchReport;
 use crate::design::{self, DesignError};
 use crate::diagnosis::outcome::{Diagnosis, NoiseSource};
 use crate::diagnosis::rows::DiagnosisError;
+use crate::diagnosis::settings::Settings;
 use crate::diagnosis::{self, Options};
 use crate::event::{Event, Listener, RealCell, Start, measurements};
 use crate::identification::alignment::{AlignmentError, align};
@@ -241,9 +242,6 @@ pub fn identify_and_tell(
     Ok(identification)
 }
 
-/// How the note of a diagnosis that cannot be made begins; a replay knows by it that one was tried.
-const NO_DIAGNOSIS: &str = "no diagnosis: ";
-
 /// Diagnoses what was measured of the scene's arm, fitted or held out, as `kincal diagnose` does with the recording.
 ///
 /// # Errors
@@ -278,7 +276,7 @@ fn tell_diagnosis(
 ) -> Result<Result<Diagnosis, DiagnosisError>, Stopped> {
     listener.report(&match &diagnosis {
         Ok(diagnosis) => Event::Diagnosed(Box::new(diagnosis.clone())),
-        Err(error) => Event::Note(format!("{NO_DIAGNOSIS}{error}")),
+        Err(error) => Event::NotDiagnosed(error.to_string()),
     })?;
     Ok(diagnosis)
 }
@@ -310,8 +308,10 @@ pub fn replay(
     for event in recorded {
         match event {
             Event::Start(start) => {
+                // What another version recorded is compared as far as that is possible.
+                let version = start.version.clone();
                 let repeated = start_event(&start.command, &start.scene);
-                listener.report(&Event::Start(Start { poses: start.poses, real: start.real.clone(), ..repeated }))?;
+                listener.report(&Event::Start(Start { version, poses: start.poses, real: start.real.clone(), ..repeated }))?;
             }
             Event::Swarm(_) | Event::Search(_) | Event::Designed(_) => {
                 // Once: the design tells all its events itself.
@@ -349,10 +349,8 @@ pub fn replay(
                     Subject::Real(real) => identify_real(real, measured, listener)?,
                 };
             }
-            Event::Diagnosed(_) => replay_diagnosis(subject, measured.as_deref(), listener)?,
-            Event::Note(note) if note.starts_with(NO_DIAGNOSIS) => {
-                replay_diagnosis(subject, measured.as_deref(), listener)?;
-            }
+            Event::Diagnosed(diagnosis) => replay_diagnosis(subject, measured.as_deref(), Some(&diagnosis.settings), listener)?,
+            Event::NotDiagnosed(_) => replay_diagnosis(subject, measured.as_deref(), None, listener)?,
             // Told again by the step that they are about.
             Event::Note(_) => {}
         }
@@ -360,10 +358,19 @@ pub fn replay(
     Ok(truth)
 }
 
-/// The diagnosis again. Those of real arms are not recorded; where one is, it cannot be recomputed and counts as different.
-fn replay_diagnosis(subject: Subject<'_>, measured: Option<&[Measurement]>, listener: &mut dyn Listener) -> Result<(), Stopped> {
+/// The diagnosis again, with the settings that were recorded. Those of real arms are not recorded; where one is, it cannot be recomputed
+/// and counts as different.
+fn replay_diagnosis(
+    subject: Subject<'_>,
+    measured: Option<&[Measurement]>,
+    settings: Option<&Settings>,
+    listener: &mut dyn Listener,
+) -> Result<(), Stopped> {
     match subject {
-        Subject::Scene(scene) => diagnose_and_tell(scene, measured.unwrap_or_default(), listener).map(|_| ()),
+        Subject::Scene(scene) => {
+            let settings = settings.unwrap_or(&scene.diagnosis);
+            tell_diagnosis(diagnose_with(scene, measured.unwrap_or_default(), settings), listener).map(|_| ())
+        }
         Subject::Real(_) => Ok(()),
     }
 }

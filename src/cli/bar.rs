@@ -67,7 +67,7 @@ impl Progress<&Event> for Bar {
                 self.bar.set_position(step.evaluations);
                 self.bar.set_message(self.criterion.value(step.best));
             }
-            Event::Start(_) | Event::Identified(_) | Event::Diagnosed(_) | Event::Note(_) => {}
+            Event::Start(_) | Event::Identified(_) | Event::Diagnosed(_) | Event::Note(_) | Event::NotDiagnosed(_) => {}
         }
         Ok(())
     }

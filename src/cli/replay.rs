@@ -80,6 +80,14 @@ pub(crate) fn command(global: &Global, options: &ReplayOptions) -> anyhow::Resul
     };
     let identical = comparison.identical() && truth_equal;
     let text = match &comparison.first_difference {
+        None if comparison.other_version > 0 => format!(
+            "identical as far as it can be compared: {} messages; {} more were recorded by kincal {}, which identifies and diagnoses by \
+             other methods than this version ({}): compare those with that version; {physics}",
+            comparison.compared,
+            comparison.other_version,
+            recorded.start.version,
+            env!("CARGO_PKG_VERSION")
+        ),
         None if cut => format!("identical up to where the recording breaks off: {} messages; {physics}", comparison.compared),
         None if truth_equal => format!("identical: {} messages compared bit for bit; {physics}", comparison.compared),
         None => format!(
@@ -98,6 +106,8 @@ pub(crate) fn command(global: &Global, options: &ReplayOptions) -> anyhow::Resul
             "identical": identical && !cut,
             "complete": !cut,
             "messages_compared": comparison.compared,
+            "recorded_by": recorded.start.version,
+            "not_comparable": comparison.other_version,
             "first_difference": comparison.first_difference.as_ref().map(ToString::to_string),
             "truth_identical": truth.is_some().then_some(truth_equal),
         }),

@@ -1,6 +1,7 @@
 //! Every number that decides what a diagnosis says, with its unit and its reason. A diagnosis carries those that it was made with, a
 //! recording keeps them, a replay uses what was recorded; `--set diagnosis.GROUP.NAME=VALUE` changes one.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Prior scales of a magnitude ([`Prior::scales`]).
@@ -10,7 +11,7 @@ macro_rules! settings {
     ($($(#[$of_group:meta])* $group:ident { $($(#[$of_number:meta])* $name:ident: $kind:ty = $value:expr,)* })*) => {
         $(
             $(#[$of_group])*
-            #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+            #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
             #[serde(default, deny_unknown_fields)]
             pub struct $group {
                 $($(#[$of_number])* pub $name: $kind,)*

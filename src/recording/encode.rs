@@ -19,6 +19,10 @@ use crate::event::{Event, Start};
 use crate::identification::outcome::Identification;
 use crate::measurement::Measurement;
 
+/// Name of a log message that is a note.
+pub(super) const NOTE: &str = "kincal";
+/// Name of a log message that says why there is no diagnosis.
+pub(super) const NOT_DIAGNOSED: &str = "kincal.no_diagnosis";
 /// Simulated time from one event of the design to the next, and around each phase, ns.
 const STEP_NS: u64 = 100_000_000;
 
@@ -108,19 +112,21 @@ impl Encoder {
             Event::Measured(measurement) => self.measured(measurement, &mut messages)?,
             Event::Identified(identification) => self.identified(identification, &mut messages)?,
             Event::Diagnosed(diagnosis) => messages.json(Topic::Diagnosis, diagnosis.as_ref())?,
-            Event::Note(note) => messages.protobuf(
-                Topic::Log,
-                &Log {
-                    timestamp: Some(timestamp(self.now_ns)),
-                    level: log::Level::Info as i32,
-                    message: note.clone(),
-                    name: "kincal".to_owned(),
-                    ..Log::default()
-                },
-            ),
+            Event::Note(note) => messages.protobuf(Topic::Log, &self.log(NOTE, note)),
+            Event::NotDiagnosed(reason) => messages.protobuf(Topic::Log, &self.log(NOT_DIAGNOSED, reason)),
         }
         self.event = self.event.saturating_add(1);
         Ok(messages.list)
+    }
+
+    fn log(&self, name: &str, message: &str) -> Log {
+        Log {
+            timestamp: Some(timestamp(self.now_ns)),
+            level: log::Level::Info as i32,
+            message: message.to_owned(),
+            name: name.to_owned(),
+            ..Log::default()
+        }
     }
 
     fn advance(&mut self, event: &Event) {
@@ -137,7 +143,7 @@ impl Encoder {
                 let since = (measurement.time_s * 1e9).round() as u64;
                 self.now_ns = self.now_ns.max(start.saturating_add(since));
             }
-            Event::Start(_) | Event::Note(_) => {}
+            Event::Start(_) | Event::Note(_) | Event::NotDiagnosed(_) => {}
         }
     }
 

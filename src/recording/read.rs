@@ -15,6 +15,7 @@ use prost::Message as _;
 
 use super::cloud;
 use super::json::Source;
+use super::encode::NOT_DIAGNOSED;
 use super::topic::Topic;
 use crate::event::{Event, Start};
 
@@ -493,7 +494,12 @@ pub fn read(path: &Path) -> Result<Recording, ReadError> {
             Some(Topic::Identification) => parse(&message.data).map(Event::Identified),
             Some(Topic::Diagnosis) => parse(&message.data).map(|diagnosis| Event::Diagnosed(Box::new(diagnosis))),
             Some(Topic::Log) => {
-                Log::decode(message.data.as_slice()).map(|log| Event::Note(log.message)).map_err(|error| error.to_string())
+                Log::decode(message.data.as_slice())
+                    .map(|log| match log.name.as_str() {
+                        NOT_DIAGNOSED => Event::NotDiagnosed(log.message),
+                        _ => Event::Note(log.message),
+                    })
+                    .map_err(|error| error.to_string())
             }
             Some(Topic::SwarmEndPoints) => match events.last_mut() {
                 Some(Event::Swarm(swarm)) if last == Some(message.event) => {
@@ -521,9 +527,12 @@ fn parse<T: Source>(data: &[u8]) -> Result<T, String> {
 }
 
 fn version_warning(path: &Path, recorded: &str) -> Option<String> {
-    let numbers =
-        |version: &str| -> Vec<u64> { version.split(['.', '-', '+']).take(3).map(|part| part.parse().unwrap_or(0)).collect() };
     let this = env!("CARGO_PKG_VERSION");
-    (numbers(recorded) > numbers(this))
+    (version_numbers(recorded) > version_numbers(this))
         .then(|| format!("{} was recorded by kincal {recorded}, this is {this}: what is new in it is not seen", path.display()))
+}
+
+/// Major, minor and patch of a version.
+pub(super) fn version_numbers(version: &str) -> Vec<u64> {
+    version.split(['.', '-', '+']).take(3).map(|part| part.parse().unwrap_or(0)).collect()
 }

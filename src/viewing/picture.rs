@@ -191,6 +191,10 @@ impl Picture {
                 diagnosis::log(stream, diagnosis, sight)?;
                 self.summary.diagnosed(diagnosis::summary(diagnosis));
             }
+            Event::NotDiagnosed(reason) => {
+                let text = format!("no diagnosis: {reason}");
+                return stream.log("notes", &TextLog::new(text).with_level(TextLogLevel::INFO));
+            }
             Event::Note(text) => return stream.log("notes", &TextLog::new(text.as_str()).with_level(TextLogLevel::INFO)),
         }
         stream.log("summary", &TextDocument::from_markdown(self.summary.markdown()))
