@@ -7,7 +7,6 @@ use std::fs;
 use std::path::PathBuf;
 
 use kincal::recording::topic::Topic;
-use serde_json::Value;
 
 use crate::figures::Figures;
 use crate::harness::command;
@@ -39,7 +38,6 @@ fn generated(name: &str) -> String {
     match name {
         "effects" => kincal::effects::catalogue_markdown(),
         "topics" => topics(),
-        "schemas" => schemas(),
         _ => panic!("nothing generates {name}"),
     }
 }
@@ -59,75 +57,6 @@ fn topics() -> String {
         vec![format!("`{}`", topic.name()), format!("`{}`", topic.schema_name()), topic.message_encoding().to_owned()]
     });
     table(&["topic", "schema", "encoding"], rows)
-}
-
-/// The fields of every JSON topic, from the schemas that stand in the recordings.
-fn schemas() -> String {
-    let mut text = String::new();
-    for topic in Topic::ALL.into_iter().filter(|topic| topic.message_encoding() == "json") {
-        let schema: Value = serde_json::from_slice(&topic.schema().data).unwrap();
-        let mut rows = Vec::new();
-        fields(&schema, &schema, "", 0, &mut rows);
-        write!(text, "### `{}`: `{}`\n\n", topic.name(), topic.schema_name()).unwrap();
-        if let Some(description) = schema["description"].as_str() {
-            write!(text, "{}\n\n", one_line(description)).unwrap();
-        }
-        text += &table(&["field", "type", "what it is"], rows);
-        text.push('\n');
-    }
-    text.trim_end().to_owned() + "\n"
-}
-
-fn one_line(text: &str) -> String {
-    text.split_whitespace()
-        .collect::<Vec<_>>()
-        .join(" ")
-        .replace('<', "&lt;")
-        .replace('[', "\\[")
-        .replace("\\[`", "`")
-        .replace("`]", "`")
-}
-
-/// What `schema` refers to, where it does.
-fn resolved<'a>(root: &'a Value, schema: &'a Value) -> &'a Value {
-    let own = ["anyOf", "oneOf", "allOf"].iter().find_map(|key| schema[*key].as_array());
-    let schema = own.and_then(|options| options.iter().find(|option| option["type"] != "null")).unwrap_or(schema);
-    match schema["$ref"].as_str() {
-        Some(reference) => root.pointer(reference.trim_start_matches('#')).unwrap_or(schema),
-        None => schema,
-    }
-}
-
-fn type_of(root: &Value, schema: &Value) -> String {
-    let found = resolved(root, schema);
-    match &found["type"] {
-        Value::String(name) if name == "array" => format!("array of {}", type_of(root, &found["items"])),
-        Value::String(name) => name.clone(),
-        Value::Array(names) => names.iter().filter_map(Value::as_str).collect::<Vec<_>>().join(" or "),
-        _ if found["enum"].is_array() => "string".to_owned(),
-        _ => "any".to_owned(),
-    }
-}
-
-/// Deeper fields than this are in the file's own schema.
-const DEPTH: usize = 2;
-
-fn fields(root: &Value, schema: &Value, prefix: &str, depth: usize, rows: &mut Vec<Vec<String>>) {
-    let schema = resolved(root, schema);
-    let Some(properties) = schema["properties"].as_object() else { return };
-    for (name, field) in properties {
-        let mut inner = resolved(root, field);
-        let mut path = format!("{prefix}{name}");
-        let about = field["description"].as_str().or(inner["description"].as_str()).map(one_line).unwrap_or_default();
-        rows.push(vec![format!("`{path}`"), type_of(root, field), about]);
-        while inner["type"] == "array" {
-            path += "[]";
-            inner = resolved(root, &inner["items"]);
-        }
-        if depth + 1 < DEPTH {
-            fields(root, inner, &format!("{path}."), depth + 1, rows);
-        }
-    }
 }
 
 /// `page` with all that is generated and all figures as they should be.
