@@ -82,6 +82,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! # The guide
+//!
+//! The [`guide`] has a tutorial, how-tos, the formulas, what was measured, a glossary, and how to add an effect, a measurement or an
+//! optimiser.
+//!
 //! # The rooms, in the order in which to read them
 //!
 //! | module | what is there |
@@ -146,3 +151,6 @@ pub mod numerics;
 pub mod seed;
 pub mod statistics;
 pub mod units;
+
+#[cfg(any(doc, doctest))]
+pub mod guide;

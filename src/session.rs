@@ -106,7 +106,7 @@ pub fn held_out(scene: &Scene) -> Result<Vec<Vec<f64>>, NothingMeasurable> {
     design::held_out(&scene.request(), scene.plan.held_out_count, scene.plan.held_out_exact)
 }
 
-/// Measures `planned` in the cell of `scene` (see [`measure`]), telling the listener every measurement.
+/// Measures `planned` in the cell of `scene` (see [`measure()`]), telling the listener every measurement.
 ///
 /// # Errors
 /// If the arm cannot be simulated, or the listener fails.

@@ -13,6 +13,10 @@ mod challenge;
 mod determinism;
 #[path = "integration/diagnose.rs"]
 mod diagnose;
+#[path = "integration/figures.rs"]
+mod figures;
+#[path = "integration/guide.rs"]
+mod guide;
 #[path = "integration/harness.rs"]
 mod harness;
 #[path = "integration/killed.rs"]
@@ -21,6 +25,8 @@ mod killed;
 mod kinematics;
 #[path = "integration/layering.rs"]
 mod layering;
+#[path = "integration/measure.rs"]
+mod measure;
 #[path = "integration/real_data.rs"]
 mod real_data;
 #[path = "integration/replay.rs"]

@@ -65,7 +65,7 @@ pub(super) fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], power: &Det
         }
     }
     let thermal = [Kind::LinkThermalGrowth, Kind::JointThermalDrift];
-    if !power.detectable.iter().any(|one| thermal.iter().any(|kind| one.kind == *kind)) {
+    if !power.detectable.iter().any(|one| thermal.contains(&one.kind)) {
         let known = analysis.measurements.iter().any(|row| row.ambient_c.is_some() || !row.temperatures_c.is_empty());
         say(if known {
             "thermal effects could not show, for the temperature hardly changed: let the arm warm up and cool down in one session"

@@ -6,7 +6,7 @@ use super::outcome::{MinimumDetectable, Place, Undetectable};
 use super::power::Bench;
 use super::search::Claim;
 use super::sentence::words;
-use crate::effects::Kind;
+use crate::effects::{Kind, Load, Need};
 
 /// What would show and what would not.
 pub(super) struct Detectability {
@@ -73,11 +73,12 @@ pub(super) fn detectability(analysis: &Analysis<'_>, noise: f64) -> Detectabilit
             });
         }
     };
-    if !columns.approach {
-        missing(Kind::Backlash, "no approach directions were recorded");
-    }
-    if !columns.temperature {
-        for kind in [Kind::LinkThermalGrowth, Kind::JointThermalDrift] {
+    for kind in Kind::known() {
+        let needs = kind.descriptor().needs;
+        if needs.contains(&Need::ApproachSides) && !columns.approach {
+            missing(kind, "no approach directions were recorded");
+        }
+        if needs.contains(&Need::Temperatures) && !columns.temperature {
             missing(kind, "no temperatures that change were recorded");
         }
     }
@@ -85,12 +86,14 @@ pub(super) fn detectability(analysis: &Analysis<'_>, noise: f64) -> Detectabilit
 }
 
 fn why_nothing(kind: Kind) -> &'static str {
-    match kind {
-        Kind::MeasurementScale => "link lengths that are fitted absorb it wholly; a scale bar would show it",
-        Kind::JointCompliance | Kind::GravityLostMotion | Kind::TiltClearance | Kind::RadialClearance | Kind::LinkBending => {
-            "gravity loads this joint not at all, or always alike"
-        }
-        Kind::Backlash => "the joint is always approached from the same side",
-        _ => "geometry absorbs it wholly on these configurations",
+    let of = kind.descriptor();
+    if of.load != Load::None {
+        "gravity loads this joint not at all, or always alike"
+    } else if of.needs.contains(&Need::ApproachSides) {
+        "the joint is always approached from the same side"
+    } else if kind == Kind::MeasurementScale {
+        "link lengths that are fitted absorb it wholly; a scale bar would show it"
+    } else {
+        "geometry absorbs it wholly on these configurations"
     }
 }

@@ -1,7 +1,7 @@
 //! From measurements to causes: what geometry leaves, which effects explain it with what probability, how far that goes on poses
 //! that were not used, what could not have been seen, and what remains unknown.
 //!
-//! Data ([`groups`], [`conditions`]) → a linear problem about the fitted geometry and the effects found so far ([`rows`], [`linear`]), made
+//! Data ([`groups`], [`conditions`]) → a linear problem about the fitted geometry and the effects found so far ([`rows`], `linear`), made
 //! again until nothing changes → sets of effects with their probabilities, for which inner products suffice ([`products`], [`evidence`],
 //! [`search`]) → what they are worth on readings that were not used ([`held_out`]) → what is said ([`outcome`]).
 

@@ -53,6 +53,7 @@ pub(crate) fn named(signature: &Signature, after: impl Fn(usize) -> f64) -> Para
         | Shape::Growth { .. }
         | Shape::GrowthOnFoot { .. }
         | Shape::Warmth { .. }
+        | Shape::BaseTilt
         | Shape::Scale
         | Shape::UnequalBend { .. }
         | Shape::UnequalSeat { .. }

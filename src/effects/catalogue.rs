@@ -90,7 +90,7 @@ pub fn catalogue_markdown() -> String {
     });
     let keys = Kind::ALL.map(|kind| {
         let keys = kind.descriptor().scene;
-        vec![code(kind.name()), keys.in_a_line()]
+        vec![code(kind.name()), code(&keys.in_a_line())]
     });
     format!(
         "True pose = pose at the joint readings + effect. Magnitudes in SI, of an arm of about 1 m reach.\n\n{}\n\

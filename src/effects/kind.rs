@@ -39,6 +39,8 @@ pub enum Kind {
     BaseDrift,
     /// The base or the sensor has moved at one moment.
     BaseStep,
+    /// The base leans under the moment of arm and payload about it.
+    BaseTilt,
     /// The tool or its reflector has been seated anew at one moment.
     ToolStep,
     /// The sensor's lengths are wrong by a factor.
@@ -81,13 +83,14 @@ const HEAT_AND_COOL: &str = "heating and cooling in one session, so that tempera
 const OTHER_PACES: &str = "links that warm at different paces";
 const OTHER_DISTANCES: &str = "targets at several distances from the joint";
 const OTHER_ORIENTATIONS: &str = "the same few configurations again with another orientation of the tool";
+const ON_THE_FOOT: &str = "a target on the base, or on the first link near it";
 const WHOLE_TRAVEL: &str = "the whole travel of the joint";
 const SPREAD_OVER_TIME: &str = "readings spread evenly over the session";
 const ENCODERS_FEEL_NO_LOAD: &str = "several payloads: an encoder does not feel them";
 
 impl Kind {
     /// Every kind, those that the diagnosis knows first.
-    pub const ALL: [Kind; 22] = [
+    pub const ALL: [Kind; 23] = [
         Kind::JointCompliance,
         Kind::LinkBending,
         Kind::Backlash,
@@ -101,6 +104,7 @@ impl Kind {
         Kind::TiltClearance,
         Kind::BaseDrift,
         Kind::BaseStep,
+        Kind::BaseTilt,
         Kind::ToolStep,
         Kind::MeasurementScale,
         Kind::MeasurementOutliers,
@@ -375,6 +379,25 @@ impl Kind {
                     optional: &["rotation_urad", "moves"],
                 },
             },
+            Kind::BaseTilt => &Descriptor {
+                name: "base_tilt",
+                about: "the base leans under the moment of arm and payload",
+                level: Level::Base,
+                unit: Unit::RadianPerNewtonMetre,
+                magnitude: "angle per moment about the base's origin",
+                range: Range::Everywhere([2e-8, 2e-7]),
+                source: Source::Assumed,
+                one_signed: true,
+                load: Load::Drives,
+                needs: &[Need::Masses],
+                known: true,
+                may_repeat: false,
+                neighbours: &[
+                    Neighbour { kind: Kind::LinkBending, told_apart_by: ON_THE_FOOT },
+                    Neighbour { kind: Kind::JointCompliance, told_apart_by: ON_THE_FOOT },
+                ],
+                scene: SceneKeys { place: ScenePlace::Nowhere, required: &["compliance_urad_per_nm"], optional: &[] },
+            },
             Kind::ToolStep => &Descriptor {
                 name: "tool_step",
                 about: "tool or reflector seated anew",
@@ -610,6 +633,9 @@ mod tests {
             assert_eq!(Kind::from_name(kind.name()), Some(kind));
         }
         assert!(Kind::known().chain(Kind::foreign()).eq(Kind::ALL), "those that are known come first");
+        // The error lists every variant of the enumeration.
+        let error = serde_json::from_value::<Kind>("none such".into()).unwrap_err().to_string();
+        assert_eq!(error.matches('`').count() / 2 - 1, Kind::ALL.len(), "a kind is not in ALL: {error}");
     }
 
     #[test]

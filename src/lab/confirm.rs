@@ -362,6 +362,7 @@ fn simulated_as(effect: &outcome::Effect, masses_known: bool) -> Result<Vec<Effe
         }
         Shape::BaseDrift => Effect::BaseDrift { moves, translation, rotation },
         Shape::BaseStep { .. } => Effect::BaseStep { moves, translation, rotation, after: after()? },
+        Shape::BaseTilt => Effect::BaseTilt { compliance: size },
         Shape::ToolStep { .. } => Effect::ToolStep { translation, rotation, after: after()? },
         Shape::Scale => return Err("the sensor's: the arm has no part in it, its formula is exact".to_owned()),
         Shape::UnequalBend { .. }
@@ -614,7 +615,7 @@ mod tests {
     /// How much of an effect's displacement the first order, or what is not known of a small load, may miss.
     fn allowed(kind: Kind, index: Option<usize>) -> f64 {
         match kind {
-            Kind::JointCompliance | Kind::LinkBending => 0.02,
+            Kind::JointCompliance | Kind::LinkBending | Kind::BaseTilt => 0.02,
             // The formula knows the side less well where next to nothing seats the play, or where friction nearly holds it.
             Kind::GravityLostMotion if index == Some(4) => 0.02,
             Kind::GravityLostMotion => 0.15,

@@ -156,6 +156,7 @@ pub fn cases(arm: &Arm) -> Vec<Case> {
     }
     let (translation, rotation) = (xyz(0.15e-3, -0.1e-3, 0.1e-3), xyz(1e-4, 2e-4, -1e-4));
     cases.extend([
+        one("base_tilt", "0.1 µrad/(N·m)".to_owned(), Effect::BaseTilt { compliance: 1e-7 }),
         one("tool_step", "0.21 mm, 245 µrad".to_owned(), Effect::ToolStep { translation, rotation, after: 0.4 }),
         one("measurement_scale", "50 ppm".to_owned(), Effect::MeasurementScale { scale: 50e-6 }),
         one("measurement_outliers", "5 % of 10 sigma".to_owned(), Effect::MeasurementOutliers { share: 0.05, factor: 10.0 }),
@@ -686,6 +687,13 @@ impl<'a> Statics<'a> {
                         motions.base.translation += translation;
                         motions.base.rotation += rotation;
                     }
+                }
+                Effect::BaseTilt { compliance } => {
+                    // The first joint's wrench, taken to the base's origin.
+                    let (axes, centre) = (standing.axes[0], standing.centres[0][1]);
+                    let moment = axes * wrenches[0].moment + centre.cross(&(axes * wrenches[0].force));
+                    let up = unit(self.arm.gravity_in_base);
+                    motions.base.rotation += (moment - up * up.dot(&moment)) * compliance;
                 }
                 Effect::ToolStep { translation, after, .. } => {
                     if row.share >= after {

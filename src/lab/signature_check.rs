@@ -21,7 +21,7 @@ use crate::simulation::injected::{Injected, Noise};
 fn allowed(kind: Kind) -> f64 {
     match kind {
         // A deflected arm bends its own torques.
-        Kind::JointCompliance | Kind::LinkBending => 0.01,
+        Kind::JointCompliance | Kind::LinkBending | Kind::BaseTilt => 0.01,
         // Rows in which the load that seats is as small as it is unknown, or near to what friction holds, count less.
         Kind::GravityLostMotion | Kind::RadialClearance | Kind::TiltClearance => 0.15,
         // The sensors of temperature are off by some hundredths of a degree.

@@ -15,7 +15,7 @@ use crate::measurement::Measurement;
 /// A topic of a recording. Poses and points are in the arm's root frame (`base_link`, or `world` where there is one), m.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Topic {
-    /// What the run was; source of [`super::event::Event::Start`].
+    /// What the run was; source of [`crate::event::Event::Start`].
     Run,
     /// Shapes of links and fixtures, in link frames.
     Shapes,

@@ -125,6 +125,11 @@ pub enum Effect {
         /// Share of the session (0 to 1) after which it happens.
         after: f64,
     },
+    /// The base leans under the moment of arm and payload about its origin.
+    BaseTilt {
+        /// rad/(N·m), along the moment across gravity.
+        compliance: f64,
+    },
     /// The tool is seated anew at one moment.
     ToolStep {
         /// m, in the tool frame.
@@ -321,6 +326,7 @@ impl Effect {
             Kind::RadialClearance | Kind::TiltClearance => Effect::clearance(joint, values),
             Kind::BaseDrift => Effect::BaseDrift { moves, translation, rotation },
             Kind::BaseStep => Effect::BaseStep { moves, translation, rotation, after },
+            Kind::BaseTilt => Effect::BaseTilt { compliance },
             Kind::ToolStep => Effect::ToolStep { translation, rotation, after },
             Kind::MeasurementScale => Effect::MeasurementScale { scale: values.scale },
             Kind::MeasurementOutliers => Effect::MeasurementOutliers { share: values.share, factor: values.factor },
@@ -386,6 +392,7 @@ impl Effect {
                 rotation: turn(magnitude, stream),
                 after: stream.uniform(0.25, 0.75),
             },
+            Kind::BaseTilt => Effect::BaseTilt { compliance: magnitude },
             Kind::ToolStep => Effect::ToolStep {
                 translation: magnitude * direction(stream),
                 rotation: turn(magnitude, stream),
@@ -439,6 +446,7 @@ impl Effect {
             }
             Effect::BaseDrift { .. } => Kind::BaseDrift,
             Effect::BaseStep { .. } => Kind::BaseStep,
+            Effect::BaseTilt { .. } => Kind::BaseTilt,
             Effect::ToolStep { .. } => Kind::ToolStep,
             Effect::MeasurementScale { .. } => Kind::MeasurementScale,
             Effect::MeasurementOutliers { .. } => Kind::MeasurementOutliers,
@@ -475,7 +483,7 @@ impl Effect {
                 at(Level::Link, *link)
             }
             Effect::LinkThermalGrowth { of: Growing::Arm(_), .. } => of(Level::Link),
-            Effect::BaseDrift { .. } | Effect::BaseStep { .. } => of(Level::Base),
+            Effect::BaseDrift { .. } | Effect::BaseStep { .. } | Effect::BaseTilt { .. } => of(Level::Base),
             Effect::ToolStep { .. } | Effect::WrongPayload { .. } => of(Level::Tool),
             Effect::MeasurementScale { .. } | Effect::MeasurementOutliers { .. } => of(Level::Sensor),
         }
@@ -486,7 +494,9 @@ impl Effect {
     pub fn magnitude(&self, kind: Option<Kind>) -> f64 {
         match self {
             Effect::JointCompliance { stiffness, .. } | Effect::HardeningStiffness { stiffness, .. } => 1.0 / stiffness,
-            Effect::LinkBending { compliance, .. } | Effect::CreepAfterMotion { compliance, .. } => *compliance,
+            Effect::LinkBending { compliance, .. }
+            | Effect::CreepAfterMotion { compliance, .. }
+            | Effect::BaseTilt { compliance } => *compliance,
             Effect::Backlash { width, .. } | Effect::GravityLostMotion { width, .. } => *width,
             Effect::JointEccentricity { amplitude, .. } | Effect::StrainWaveError { amplitude, .. } => amplitude.abs(),
             Effect::GearCoupling { ratio_error, coupling, .. } => ratio_error.abs().max(coupling.abs()),

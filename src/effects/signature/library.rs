@@ -5,7 +5,7 @@ pub use super::radial_clearance::HELD;
 use super::shape::Shape;
 pub use super::strain_wave_error::{RIPPLES, WAVES_PER_TURN, ripple};
 use super::{
-    backlash, base_drift, base_step, gear_coupling, gravity_lost_motion, joint_compliance, joint_eccentricity,
+    backlash, base_drift, base_step, base_tilt, gear_coupling, gravity_lost_motion, joint_compliance, joint_eccentricity,
     joint_thermal_drift, link_bending, link_thermal_growth, measurement_scale, radial_clearance, strain_wave_error,
     tilt_clearance, tool_step, unnamed,
 };
@@ -134,6 +134,7 @@ fn hypotheses(kind: Kind, site: &Site<'_>, all: &mut Vec<Hypothesis>) {
         Kind::TiltClearance => tilt_clearance::hypotheses(site, all),
         Kind::BaseDrift => base_drift::hypotheses(site, all),
         Kind::BaseStep => base_step::hypotheses(site, all),
+        Kind::BaseTilt => base_tilt::hypotheses(site, all),
         Kind::ToolStep => tool_step::hypotheses(site, all),
         Kind::MeasurementScale => measurement_scale::hypotheses(site, all),
         // They move nothing: readings are weighted instead.

@@ -4,6 +4,7 @@
 mod backlash;
 mod base_drift;
 mod base_step;
+mod base_tilt;
 mod gear_coupling;
 mod gravity_lost_motion;
 mod joint_compliance;

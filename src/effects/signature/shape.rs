@@ -16,7 +16,7 @@ use super::unnamed::{
     torque_memory, unequal_bend, unequal_seat, unequal_shift,
 };
 use super::{
-    backlash, base_drift, base_step, gear_coupling, gravity_lost_motion, joint_compliance, joint_eccentricity,
+    backlash, base_drift, base_step, base_tilt, gear_coupling, gravity_lost_motion, joint_compliance, joint_eccentricity,
     joint_thermal_drift, link_bending, link_thermal_growth, measurement_scale, radial_clearance, tilt_clearance, tool_step,
 };
 use crate::effects::Kind;
@@ -148,6 +148,8 @@ pub enum Shape {
         /// Place in the order of time, from 0, of the first reading after it.
         row: usize,
     },
+    /// \[1\] A turn about the base's origin along the horizontal moment about it.
+    BaseTilt,
     /// \[3, 6 with orientations\] A twist of the tool from a row on.
     ToolStep {
         /// Place in the order of time, from 0, of the first reading after it.
@@ -470,6 +472,7 @@ impl Shape {
             Shape::MomentAcrossSign { joint, held } => tilt_clearance::columns(reading, joint, held),
             Shape::BaseDrift => base_drift::columns(reading),
             Shape::BaseStep { row } => base_step::columns(reading, row),
+            Shape::BaseTilt => base_tilt::columns(reading),
             Shape::ToolStep { row } => tool_step::columns(reading, row, orientation),
             Shape::Scale => measurement_scale::columns(reading),
             Shape::UnequalBend { joint } => unequal_bend::columns(reading, joint),
@@ -506,6 +509,7 @@ impl Shape {
             | Shape::Warmth { .. }
             | Shape::ForceAcrossSign { .. }
             | Shape::MomentAcrossSign { .. }
+            | Shape::BaseTilt
             | Shape::Scale
             | Shape::Bump { .. }
             | Shape::TorqueMemory { .. }
@@ -566,6 +570,7 @@ impl Shape {
             | Shape::Warmth { .. }
             | Shape::BaseDrift
             | Shape::BaseStep { .. }
+            | Shape::BaseTilt
             | Shape::ToolStep { .. }
             | Shape::Scale
             | Shape::UnequalBend { .. }
@@ -605,6 +610,7 @@ impl Shape {
             | Shape::MomentAcrossSign { .. }
             | Shape::BaseDrift
             | Shape::BaseStep { .. }
+            | Shape::BaseTilt
             | Shape::ToolStep { .. }
             | Shape::Scale
             | Shape::UnequalBend { .. }
@@ -662,6 +668,7 @@ impl Shape {
             | Shape::MomentAcrossSign { .. }
             | Shape::BaseDrift
             | Shape::BaseStep { .. }
+            | Shape::BaseTilt
             | Shape::ToolStep { .. }
             | Shape::Scale => return None,
         })

@@ -84,7 +84,8 @@ pub fn softest(kind: Kind) -> f64 {
         | Kind::StrainWaveError
         | Kind::GearCoupling
         | Kind::RadialClearance
-        | Kind::TiltClearance => 10.0,
+        | Kind::TiltClearance
+        | Kind::BaseTilt => 10.0,
         Kind::LinkThermalGrowth
         | Kind::JointThermalDrift
         | Kind::BaseDrift

@@ -1,6 +1,6 @@
 //! What `kincal reproduce` repeats: every table and figure of Chen et al. 2019, and what goes beyond them.
 //!
-//! One file per experiment. Each computes its trials side by side ([`Bench::trials`]) and returns what it [`Found`]: the paper's numbers
+//! One file per experiment. Each computes its trials side by side (`Bench::trials`) and returns what it [`Found`]: the paper's numbers
 //! beside ours, a verdict, the data and the figures. [`Experiment::run`] says of which experiment and arm that is.
 
 pub mod advice;

@@ -77,6 +77,7 @@ impl TrueEffect {
             Effect::BaseStep { translation, rotation, after, .. } | Effect::ToolStep { translation, rotation, after } => {
                 (translation.norm(), "m", vec![("rotation_rad", rotation.norm()), ("after", *after)])
             }
+            Effect::BaseTilt { compliance } => (*compliance, "rad/(N·m)", vec![]),
             Effect::MeasurementScale { scale } => (*scale, "1", vec![]),
             Effect::MeasurementOutliers { share, factor } => (*share, "1", vec![("factor", *factor)]),
             Effect::WornToothSector { depth, centre, half_width, .. } => {

@@ -19,8 +19,6 @@ pub(super) struct Drive {
     pub(super) memories: Vec<Memory>,
     /// Drift of the zero with the temperature of the link that the joint moves, rad/K.
     pub(super) zero_drift: f64,
-    /// rad/(N·m).
-    pub(super) crosstalk: f64,
 }
 
 /// An encoder whose disc is badly fitted.

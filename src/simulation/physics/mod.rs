@@ -17,6 +17,7 @@
 //! | memory hysteresis | Dahl's friction, exact for each straight move of the session |
 //! | moment crosstalk | the servo adds what its torque sensor reads of the moment across, until both agree |
 //! | thermal growth and drift | segments that scale, encoder zeros that move |
+//! | base tilt | the root frame leans under the moment of what it carries, until both agree |
 //! | base and tool | the root frame moves in the world (gravity does not), the tool moves on its link |
 //!
 //! What the sensor does is in `cell::sensor`. Several effects at one joint are in series from the motor outwards: drive train,

@@ -43,8 +43,8 @@ struct Task {
     /// Where each coordinate stood at the end of the move, as far as it creeps.
     told: Vec<f64>,
     dwell_s: f64,
-    /// Outputs of the drive trains before loads are mistaken for torque.
-    outputs: Vec<f64>,
+    /// The placement before anything has answered to the load.
+    unloaded: Placement,
 }
 
 impl PhysicalArm {
@@ -75,15 +75,15 @@ impl PhysicalArm {
         assert_eq!(conditions.from.len(), count, "one coordinate per joint");
         assert_eq!(conditions.rise_k.len(), count + 1, "one temperature per link");
         let mut placement = self.arm.placement(conditions);
-        let outputs = placement.joints.clone();
+        let unloaded = placement.clone();
         let mut plays = vec![Play::CENTRE; count];
         let mut coordinates = vec![0.0; self.arm.coordinates.len()];
         let told = self.told(conditions);
         let first = self.holds(&coordinates, &[], &told, conditions.dwell_s, 0);
         self.world.place(&self.arm, &placement, &Yielded { plays: &plays, coordinates: &coordinates, holds: &first });
-        let crosstalk = self.arm.drives.iter().any(|drive| drive.crosstalk != 0.0);
-        if crosstalk {
-            self.mistake_moments(&outputs, &mut placement);
+        let answers = !self.arm.reactions.is_none();
+        if answers {
+            self.arm.reactions.answer(&self.arm, &self.world, &unloaded, &mut placement);
             self.world.place(&self.arm, &placement, &Yielded { plays: &plays, coordinates: &coordinates, holds: &first });
         }
         let mut loads = self.world.loads();
@@ -99,7 +99,7 @@ impl PhysicalArm {
             ways: vec![0.0; coordinates.len()],
             told,
             dwell_s: conditions.dwell_s,
-            outputs,
+            unloaded,
         };
         (task.ways, coordinates) = self.before_the_move(conditions);
         if self.settling.start == Start::Predicted && self.world.freedoms() > 0 {
@@ -114,7 +114,7 @@ impl PhysicalArm {
         }
         let mut base_from_tool = self.world.base_from_tool();
         let (mut steps, mut moved_m, mut moved_rad) = (0, 0.0, 0.0);
-        let mut converged = self.world.freedoms() == 0 && !crosstalk;
+        let mut converged = self.world.freedoms() == 0 && !answers;
         while !converged && steps < self.settling.steps_max.max(least) {
             if self.world.freedoms() > 0 {
                 self.world.damp(&self.arm, &loads, &task.decisions);
@@ -123,8 +123,8 @@ impl PhysicalArm {
                 plays = self.world.plays();
                 coordinates = self.world.coordinates();
             }
-            if crosstalk {
-                self.mistake_moments(&task.outputs, &mut task.placement);
+            if answers {
+                self.arm.reactions.answer(&self.arm, &self.world, &task.unloaded, &mut task.placement);
             }
             steps += 1;
             self.put(&task, &plays, &coordinates, steps);
@@ -181,13 +181,6 @@ impl PhysicalArm {
             }
         };
         self.arm.coordinates.iter().enumerate().map(hold).collect()
-    }
-
-    /// Turns each joint further by what its servo takes for a torque error.
-    fn mistake_moments(&self, outputs: &[f64], placement: &mut Placement) {
-        for (joint, drive) in self.arm.drives.iter().enumerate().filter(|(_, drive)| drive.crosstalk != 0.0) {
-            placement.joints[joint] = outputs[joint] + drive.crosstalk * self.world.moment_across(&self.arm, joint);
-        }
     }
 
     /// What decides where each coordinate rests under the loads `turning`.

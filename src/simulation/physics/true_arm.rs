@@ -7,7 +7,7 @@ use super::conditions::Conditions;
 use super::coordinate::{BEAM_POINTS, Coordinate, Direction};
 use super::drive_train::Drive;
 use super::error::PhysicsError;
-use super::mechanism::{Held, Mechanisms, Shift, shifted};
+use super::mechanism::{Held, Mechanisms, Reactions, Shift, shifted};
 use super::play::{Decision, Load};
 use crate::arm::frames::Pose;
 use crate::arm::{Arm, Inertial};
@@ -35,7 +35,9 @@ pub(super) struct TrueArm {
     base_shifts: Vec<Shift>,
     tool_shifts: Vec<Shift>,
     /// Mass that the tool carries beyond what is believed, kg.
-    pub(super) excess_kg: f64,
+    excess_kg: f64,
+    /// What answers to the load.
+    pub(super) reactions: Reactions,
     /// Mass distribution of the link that each joint moves, in the frame after the joint's motion.
     pub(super) inertials: Vec<Inertial>,
     /// Pose of that link's frame in the frame after the joint's motion: turned where a URDF's axis is not z.
@@ -131,6 +133,7 @@ impl TrueArm {
             base_shifts: parts.base_shifts,
             tool_shifts: parts.tool_shifts,
             excess_kg: parts.excess_kg,
+            reactions: parts.reactions,
             inertials,
             joint_from_link,
             gravity_in_base: arm.gravity_in_base,

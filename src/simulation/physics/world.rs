@@ -325,21 +325,22 @@ impl World {
         loads
     }
 
-    /// The moment of gravity on what joint `joint` carries, about the x axis of its frame, N·m, as last placed.
-    pub(super) fn moment_across(&self, arm: &TrueArm, joint: usize) -> f64 {
+    /// Frame of joint `joint` before its motion, as last placed.
+    pub(super) fn base_from_joint(&self, joint: usize) -> Pose {
         let first = self.link(self.links[joint].first);
         let inboard = match first.parent_id() {
             Some(parent) => self.base_from(parent),
             None => Pose::identity(),
         };
-        let base_from_joint = inboard * self.inboard_from_joint[joint];
-        let centre = base_from_joint.translation.vector;
-        let masses = (joint..self.links.len())
+        inboard * self.inboard_from_joint[joint]
+    }
+
+    /// The moment of gravity on joint `from`'s link, all outboard of it and the payload, about `centre`, N·m, as last placed.
+    pub(super) fn moment_about(&self, arm: &TrueArm, centre: &Vector3<f64>, from: usize) -> Vector3<f64> {
+        let masses = (from..self.links.len())
             .map(|outer| self.base_from(self.links[outer].body) * arm.inertials[outer].centre_of_mass_in_link)
             .chain([Point3::from(self.base_from_tool().translation.vector)]);
-        let moment: Vector3<f64> =
-            masses.zip(&self.weights[joint..]).map(|(point, weight)| (point.coords - centre).cross(weight)).sum();
-        moment.dot(&(base_from_joint.rotation * Vector3::x()))
+        masses.zip(&self.weights[from..]).map(|(point, weight)| (point.coords - centre).cross(weight)).sum()
     }
 
     /// The loads on the coordinates that yield: torques about their axes (forces along them).

@@ -5,6 +5,7 @@
 mod backlash;
 mod base_drift;
 mod base_step;
+mod base_tilt;
 mod bearing_clearance;
 mod creep_after_motion;
 mod gear_coupling;
@@ -30,6 +31,8 @@ use super::clearance::Clearance;
 use super::coordinate::{Coordinate, Direction, Law};
 use super::drive_train::{Drive, Memory, WaveGenerator, WornSector};
 use super::error::PhysicsError;
+use super::true_arm::{Placement, TrueArm};
+use super::world::World;
 use crate::arm::JointKind;
 use crate::arm::frames::{Pose, rotation_from_vector};
 use crate::effects::{Level, Location};
@@ -56,6 +59,30 @@ pub(super) struct Mechanisms {
     pub(super) tool_shifts: Vec<Shift>,
     /// Mass that the tool carries beyond what is believed, kg.
     pub(super) excess_kg: f64,
+    /// What answers to the load.
+    pub(super) reactions: Reactions,
+}
+
+/// What answers to the load by moving the arm, until both agree: it is looked at anew after every step.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Reactions {
+    /// Turn of each joint per moment about the x axis of its frame, rad/(N·m).
+    crosstalk: Vec<f64>,
+    /// Lean of the base per moment about its origin, rad/(N·m).
+    base_tilt: f64,
+}
+
+impl Reactions {
+    /// Whether nothing answers.
+    pub(super) fn is_none(&self) -> bool {
+        self.base_tilt == 0.0 && self.crosstalk.iter().all(|gain| *gain == 0.0)
+    }
+
+    /// Moves what is to be placed: `unloaded` as it would be without a load, under the load of the arm as `world` has last placed it.
+    pub(super) fn answer(&self, arm: &TrueArm, world: &World, unloaded: &Placement, placement: &mut Placement) {
+        moment_crosstalk::answer(&self.crosstalk, arm, world, unloaded, placement);
+        base_tilt::answer(self.base_tilt, arm, world, unloaded, placement);
+    }
 }
 
 /// Shares of the load up to which friction holds a play in its middle.
@@ -186,6 +213,7 @@ impl Mechanisms {
             base_shifts: Vec::new(),
             tool_shifts: Vec::new(),
             excess_kg: 0.0,
+            reactions: Reactions { crosstalk: vec![0.0; count], base_tilt: 0.0 },
         };
         for effect in effects {
             parts.add(&Checks { kinds, effect: effect.name(), location: effect.location() }, effect)?;
@@ -222,6 +250,7 @@ impl Mechanisms {
             Effect::BaseStep { moves, translation, rotation, after } => {
                 base_step::add(self, checks, moves, (translation, rotation), after)
             }
+            Effect::BaseTilt { compliance } => base_tilt::add(self, checks, compliance),
             Effect::ToolStep { translation, rotation, after } => tool_step::add(self, checks, (translation, rotation), after),
             Effect::MeasurementScale { scale } => measurement_scale::check(checks, scale),
             Effect::MeasurementOutliers { share, factor } => measurement_outliers::check(checks, share, factor),
