@@ -357,8 +357,8 @@ pub(crate) struct Analysis<'a> {
     pub(crate) orientation: f64,
     pub(crate) maps: Vec<outcome::Map>,
     pub(crate) residuals: Vec<outcome::Residual>,
-    /// Of each row, which member of the best set moves it most.
-    pub(crate) moved: Vec<Option<usize>>,
+    /// What each member of the best set does.
+    pub(crate) moved: Moved,
     pub(crate) measurements: &'a [&'a Measurement],
     pub(crate) sensor: &'a Sensor,
     pub(crate) repeats: Option<Repeats>,
@@ -415,7 +415,7 @@ pub fn diagnose(
     let geometry_alone = linear.left(&calibrated.geometry(&[]), &DVector::zeros(residual.len()));
     let orientation_sigma_rad = sensor.orientation_sigma_rad.map(|sigma| sigma * state.orientation);
     let analysis = Analysis {
-        moved: moved_most(&linear, &evidence, &found.best),
+        moved: moved(&linear, &evidence, &found.best),
         residuals: residuals(&pass.rows, measurements, &geometry_alone, &residual),
         maps: open_set::maps(&pass.conditions, &pass.rows.shifts(&residual), settings.validation.bins),
         linear: &linear,
@@ -591,8 +591,15 @@ fn noise_prior(repeats: Option<Repeats>, declared_m: f64, source: NoiseSource, s
     }
 }
 
-/// Of each row, which of `members` moves it most beyond what geometry absorbs.
-fn moved_most(linear: &Linear<'_>, evidence: &Evidence<'_>, members: &[(usize, usize)]) -> Vec<Option<usize>> {
+/// What members of a set do beyond what geometry absorbs.
+pub(crate) struct Moved {
+    /// Of each row, which member moves it most.
+    most: Vec<Option<usize>>,
+    /// Of each member, the 3-D RMS of what it does to the positions, m.
+    rms_m: Vec<f64>,
+}
+
+fn moved(linear: &Linear<'_>, evidence: &Evidence<'_>, members: &[(usize, usize)]) -> Moved {
     let coefficients = evidence.coefficients(members);
     let seen: Vec<DVector<f64>> = members
         .iter()
@@ -606,12 +613,13 @@ fn moved_most(linear: &Linear<'_>, evidence: &Evidence<'_>, members: &[(usize, u
             linear.made(&own) - &linear.rows.jacobian * absorbed
         })
         .collect();
-    (0..linear.count())
-        .map(|row| {
-            let size = |member: &usize| seen[*member].rows_range(linear.rows.equations.of_position(row)).norm_squared();
-            (0..members.len()).max_by(|a, b| size(a).total_cmp(&size(b)))
-        })
-        .collect()
+    let square = |member: usize, row: usize| seen[member].rows_range(linear.rows.equations.of_position(row)).norm_squared();
+    let most = |row: usize| (0..members.len()).max_by(|a, b| square(*a, row).total_cmp(&square(*b, row)));
+    let rms = |member: usize| {
+        let sum: f64 = (0..linear.count()).map(|row| square(member, row)).sum();
+        libm::sqrt(sum / linear.count().max(1) as f64)
+    };
+    Moved { most: (0..linear.count()).map(most).collect(), rms_m: (0..members.len()).map(rms).collect() }
 }
 
 /// What is left of each reading, in the measurement frame.

@@ -292,11 +292,19 @@ impl<'a> Marginal<'a> {
             return Arc::clone(row);
         }
         let width = self.products.width();
-        let by_fold = self.products.of_column(number);
         let mut row = vec![0.0; width];
-        for (fold, values) in by_fold.chunks_exact(width.max(1)).enumerate() {
-            if Some(fold) != self.left_out {
-                row.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+        if self.left_out.is_some() {
+            let by_fold = self.products.of_column(number);
+            for (fold, values) in by_fold.chunks_exact(width.max(1)).enumerate() {
+                if Some(fold) != self.left_out {
+                    row.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+                }
+            }
+        } else {
+            // Of many columns, which no fold asks for.
+            for fold in &self.products.folds {
+                let own = column(&fold.signatures, number);
+                row.iter_mut().enumerate().for_each(|(other, sum)| *sum += dot(own, column(&fold.signatures, other)));
             }
         }
         let mixed = column(&self.mixed, number);

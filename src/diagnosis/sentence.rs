@@ -90,19 +90,7 @@ fn nowhere(power: &Detectability) -> String {
 
 /// A kind at a place, in words.
 pub(super) fn words(kind: &str, location: &Location) -> String {
-    let level = match location.level {
-        Level::Joint => "joint",
-        Level::Link => "link",
-        Level::Base => "the base",
-        Level::Tool => "the tool",
-        Level::Sensor => "the sensor",
-    };
-    let kind = kind.replace('_', " ");
-    match location.index {
-        Some(index) => format!("{kind} of {level} {index}"),
-        None if location.level == Level::Link => format!("{kind} of the whole arm"),
-        None => format!("{kind} of {level}"),
-    }
+    format!("{} of {location}", kind.replace('_', " "))
 }
 
 fn of_place(kind: &str, place: &Place) -> String {

@@ -218,6 +218,8 @@ settings! {
         few: f64 = 4.0,
         /// Error by rounded joint readings over the sensor's from which on it is worth a word.
         rounded: f64 = 0.3,
+        /// Shapes without a name that are said of what is unknown, the largest first.
+        unknown_said: usize = 4,
         /// Correlation of readings of one configuration that is worth a word.
         correlation: f64 = 0.05,
     }

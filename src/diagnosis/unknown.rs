@@ -24,7 +24,13 @@ pub(super) fn unknown(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFl
     let present = of_nameless >= decision.named || structured || excess || scatters;
     let r#where = present.then(|| {
         let members = analysis.found.best.iter().map(|(hypothesis, _)| &analysis.evidence.candidates.hypotheses[*hypothesis]);
-        let mut said: Vec<String> = members.filter(|of| of.kind.is_none()).map(|of| of.detail.clone()).collect();
+        let mut unnamed: Vec<_> = members.zip(&analysis.moved.rms_m).filter(|(of, _)| of.kind.is_none()).collect();
+        unnamed.sort_by(|a, b| b.1.total_cmp(a.1));
+        let largest = unnamed.iter().take(decision.unknown_said);
+        let mut said: Vec<String> = largest.map(|(of, rms_m)| format!("{} ({:.0} µm)", of.detail, *rms_m * 1e6)).collect();
+        if unnamed.len() > decision.unknown_said {
+            said.push(format!("{} smaller ones", unnamed.len() - decision.unknown_said));
+        }
         said.extend(analysis.scatter.iter().map(|one| one.detail(level, analysis.linear.rows.mechanism.slides[one.joint])));
         if structured {
             said.push(analysis.structure.r#where.clone());

@@ -84,6 +84,71 @@ fn decide(unknown: &Unknown, effects: &[Effect], sets: &[Vec<Candidate>], share:
 
 /// What is left of each reading, with the effect that moves it most.
 fn residuals(analysis: &Analysis<'_>, of_member: &[Option<usize>]) -> Vec<Residual> {
-    let rows = analysis.residuals.iter().zip(&analysis.moved);
+    let rows = analysis.residuals.iter().zip(&analysis.moved.most);
     rows.map(|(residual, moved)| Residual { cause: moved.and_then(|member| of_member[member]), ..residual.clone() }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::outcome::{Magnitude, Parameters, Place};
+    use crate::effects::Level;
+
+    const NOWHERE: Place = Place { level: Level::Joint, index: Some(2), time_s: None };
+
+    fn effect(kind: Kind, probability: f64, chosen: usize) -> Effect {
+        Effect {
+            kind,
+            location: NOWHERE,
+            probability,
+            magnitude: Magnitude { value: 1e-4, unit: "rad".to_owned(), ci95: [0.9e-4, 1.1e-4] },
+            parameters: Parameters::default(),
+            signature: None,
+            held_out_rms_before_m: 1e-4,
+            held_out_rms_after_m: 5e-5,
+            gap_closed: None,
+            folds: [chosen, 5],
+            detail: String::new(),
+        }
+    }
+
+    fn set(probabilities: &[f64]) -> Vec<Vec<Candidate>> {
+        let candidate = |probability: &f64| Candidate {
+            kind: Some(Kind::Backlash),
+            location: NOWHERE,
+            probability: *probability,
+            detail: String::new(),
+        };
+        vec![probabilities.iter().map(candidate).collect()]
+    }
+
+    /// The verdict table of the guide, line by line.
+    #[test]
+    fn verdicts_are_those_of_the_guide() {
+        let decide = |unknown: bool, effects: &[Effect], sets: &[Vec<Candidate>], share: f64| {
+            let unknown = Unknown { present: unknown, p_value: 0.5, r#where: None };
+            super::decide(&unknown, effects, sets, share, &Decision::default())
+        };
+        let backlash = |probability: f64, chosen: usize| effect(Kind::Backlash, probability, chosen);
+        // Nothing is seen: how much could have been decides.
+        assert_eq!(decide(false, &[], &[], 0.5), Verdict::NoGap);
+        assert_eq!(decide(false, &[], &[], 0.49), Verdict::NotDetectable);
+        // All causes sure, and chosen by half of the folds.
+        assert_eq!(decide(false, &[backlash(0.95, 3), backlash(1.0, 5)], &[], 0.9), Verdict::Explained);
+        assert_eq!(decide(false, &[backlash(0.95, 2)], &[], 0.9), Verdict::Ambiguous);
+        assert_eq!(decide(false, &[backlash(0.94, 5)], &[], 0.9), Verdict::Ambiguous);
+        assert_eq!(decide(false, &[backlash(0.99, 5), backlash(0.7, 5)], &[], 0.9), Verdict::Ambiguous);
+        // Readings far off are all there is: how folds choose says nothing of them.
+        assert_eq!(decide(false, &[effect(Kind::MeasurementOutliers, 0.8, 0)], &[], 0.9), Verdict::Explained);
+        // Something is there, and nothing is named.
+        assert_eq!(decide(false, &[], &set(&[0.3, 0.3]), 0.9), Verdict::Ambiguous);
+        assert_eq!(decide(false, &[], &set(&[0.2, 0.2]), 0.9), Verdict::NoGap);
+        // Whatever is named, something else remains.
+        assert_eq!(decide(true, &[backlash(1.0, 5)], &[], 0.9), Verdict::UnknownRemains);
+        assert_eq!(decide(true, &[], &[], 0.0), Verdict::UnknownRemains);
+        // The numbers that decide can be changed.
+        let strict = Decision { sure: 0.999, ..Decision::default() };
+        let unknown = Unknown { present: false, p_value: 0.5, r#where: None };
+        assert_eq!(super::decide(&unknown, &[backlash(0.99, 5)], &[], 0.9, &strict), Verdict::Ambiguous);
+    }
 }

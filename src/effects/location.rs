@@ -1,5 +1,7 @@
 //! Where an effect sits.
 
+use std::fmt;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -26,4 +28,22 @@ pub struct Location {
     pub level: Level,
     /// Number of the joint or link, from 1; `None` for the whole arm and for what has no number.
     pub index: Option<usize>,
+}
+
+/// As it is said everywhere: `joint 3`, `link 2`, `the whole arm`, `the base`.
+impl fmt::Display for Location {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let level = match (self.level, self.index) {
+            (Level::Joint, _) => "joint",
+            (Level::Link, Some(_)) => "link",
+            (Level::Link, None) => "the whole arm",
+            (Level::Base, _) => "the base",
+            (Level::Tool, _) => "the tool",
+            (Level::Sensor, _) => "the sensor",
+        };
+        match self.index {
+            Some(index) => write!(f, "{level} {index}"),
+            None => f.write_str(level),
+        }
+    }
 }

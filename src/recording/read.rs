@@ -14,8 +14,8 @@ use mcap::{MAGIC, McapError};
 use prost::Message as _;
 
 use super::cloud;
-use super::json::Source;
 use super::encode::NOT_DIAGNOSED;
+use super::json::Source;
 use super::topic::Topic;
 use crate::event::{Event, Start};
 
@@ -493,14 +493,12 @@ pub fn read(path: &Path) -> Result<Recording, ReadError> {
             Some(Topic::Measurement) => parse(&message.data).map(Event::Measured),
             Some(Topic::Identification) => parse(&message.data).map(Event::Identified),
             Some(Topic::Diagnosis) => parse(&message.data).map(|diagnosis| Event::Diagnosed(Box::new(diagnosis))),
-            Some(Topic::Log) => {
-                Log::decode(message.data.as_slice())
-                    .map(|log| match log.name.as_str() {
-                        NOT_DIAGNOSED => Event::NotDiagnosed(log.message),
-                        _ => Event::Note(log.message),
-                    })
-                    .map_err(|error| error.to_string())
-            }
+            Some(Topic::Log) => Log::decode(message.data.as_slice())
+                .map(|log| match log.name.as_str() {
+                    NOT_DIAGNOSED => Event::NotDiagnosed(log.message),
+                    _ => Event::Note(log.message),
+                })
+                .map_err(|error| error.to_string()),
             Some(Topic::SwarmEndPoints) => match events.last_mut() {
                 Some(Event::Swarm(swarm)) if last == Some(message.event) => {
                     let cloud = PointCloud::decode(message.data.as_slice()).map_err(|error| error.to_string());

@@ -3,7 +3,7 @@
 use super::table;
 use crate::diagnosis::held_out::Block;
 use crate::diagnosis::outcome::{Candidate, Diagnosis, Map, NoiseSource, Place};
-use crate::effects::{Kind, Level};
+use crate::effects::{Kind, Level, Location};
 use crate::units::number;
 
 /// The whole report.
@@ -173,21 +173,10 @@ fn shown(unit: &str) -> (&str, f64) {
 
 /// A place in words.
 pub(crate) fn place(place: &Place) -> String {
-    let level = match place.level {
-        Level::Joint => "joint",
-        Level::Link => "link",
-        Level::Base => "base",
-        Level::Tool => "tool",
-        Level::Sensor => "sensor",
-    };
-    let at = match (place.level, place.index) {
-        (_, Some(index)) => format!("{level} {index}"),
-        (Level::Link, None) => "all links".to_owned(),
-        _ => level.to_owned(),
-    };
+    let at = Location { level: place.level, index: place.index };
     match place.time_s {
         Some(time) => format!("{at}, {time:.0} s"),
-        None => at,
+        None => at.to_string(),
     }
 }
 

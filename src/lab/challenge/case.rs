@@ -11,7 +11,7 @@ use crate::effects::{Kind, Location};
 use crate::event::{Event, Start};
 use crate::lab::conditions::course;
 use crate::lab::detectability::{difference, geometry_of_cell, has_signal, noiseless, without};
-use crate::lab::injection::places;
+use crate::lab::injection::{is_its_own, places};
 use crate::measurement::Measurement;
 use crate::progress::{Progress as _, Silent};
 use crate::recording::write::Recorder;
@@ -282,7 +282,10 @@ pub fn hidden(public: &Public, options: &Options, key: &[u8; 32], index: usize) 
     let count = if without_effect { 0 } else { fewest + stream.index(most.max(fewest) - fewest + 1) };
     let which = stream.unit();
     let arm = &public.file.scene.arm;
-    let choice: Vec<Kind> = options.kinds.iter().filter_map(|name| Kind::from_name(name)).collect();
+    let mut choice: Vec<Kind> = options.kinds.iter().filter_map(|name| Kind::from_name(name)).collect();
+    if choice.len() > 1 {
+        choice.retain(|kind| is_its_own(*kind, arm));
+    }
     let (mut kinds, mut effects): (Vec<Kind>, Vec<Effect>) = (Vec::new(), Vec::new());
     let foreign: Vec<Kind> = Kind::foreign().collect();
     while effects.len() < count + options.outside {

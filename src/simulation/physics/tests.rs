@@ -227,7 +227,7 @@ fn effects_that_cannot_be_are_refused() {
         ),
         (
             Effect::LinkThermalGrowth { of: Growing::Arm(Foot::Own), expansion: 1.0 },
-            "the expansion of link_thermal_growth at all links is 1, expected between -0.001 and 0.001 (1/K)",
+            "the expansion of link_thermal_growth at the whole arm is 1, expected between -0.001 and 0.001 (1/K)",
         ),
         (
             Effect::MeasurementOutliers { share: 2.0, factor: 5.0 },

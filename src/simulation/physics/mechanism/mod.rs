@@ -140,7 +140,7 @@ struct Checks<'a> {
 
 impl Checks<'_> {
     fn bad(&self, what: &'static str, got: f64, expected: &'static str) -> Result<(), PhysicsError> {
-        Err(PhysicsError::BadEffect { effect: self.effect, place: words(&self.location), what, got, expected })
+        Err(PhysicsError::BadEffect { effect: self.effect, place: self.location, what, got, expected })
     }
 
     fn require(&self, good: bool, what: &'static str, got: f64, expected: &'static str) -> Result<(), PhysicsError> {
@@ -289,22 +289,6 @@ impl Mechanisms {
             }
         }
         self.coordinates.push(Coordinate { joint, direction, law });
-    }
-}
-
-/// A place in words, such as `joint 3`.
-fn words(location: &Location) -> String {
-    let level = match location.level {
-        Level::Joint => "joint",
-        Level::Link => "link",
-        Level::Base => "the base",
-        Level::Tool => "the tool",
-        Level::Sensor => "the sensor",
-    };
-    match location.index {
-        Some(number) => format!("{level} {number}"),
-        None if location.level == Level::Link => "all links".to_owned(),
-        None => level.to_owned(),
     }
 }
 
