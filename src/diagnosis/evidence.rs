@@ -143,7 +143,7 @@ impl<'a> Evidence<'a> {
         for (hypothesis, scale) in members {
             for column in self.candidates.columns(*hypothesis) {
                 columns.push(column);
-                let [size, _] = self.settings.prior.scales[*scale];
+                let size = self.settings.prior.scales[*scale];
                 precision.push(1.0 / (size * size));
             }
         }
@@ -190,7 +190,7 @@ impl<'a> Evidence<'a> {
         let mut at = 0;
         let mut total = self.log_ratio(model.drop, model.log_determinant) + log_multiplicity(members.len());
         for (hypothesis, scale) in members {
-            total += self.candidates.log_odds[*hypothesis] + libm::log(self.settings.prior.scales[*scale][1]);
+            total += self.candidates.log_odds[*hypothesis] + libm::log(self.settings.prior.scale_shares[*scale]);
             if one_signed(&self.candidates.hypotheses[*hypothesis]) {
                 total += log_allowed(model.coefficients[at], libm::sqrt(level * model.inverse[(at, at)]));
             }
@@ -245,7 +245,7 @@ impl<'a> Evidence<'a> {
         let prior = log_multiplicity(members.len() + 1)
             + members
                 .iter()
-                .map(|(hypothesis, scale)| candidates.log_odds[*hypothesis] + libm::log(self.settings.prior.scales[*scale][1]))
+                .map(|(hypothesis, scale)| candidates.log_odds[*hypothesis] + libm::log(self.settings.prior.scale_shares[*scale]))
                 .sum::<f64>();
         let rows: Vec<Arc<Vec<f64>>> = base.columns.iter().map(|column| marginal.row(*column)).collect();
         let count = rows.len();
@@ -281,7 +281,7 @@ impl<'a> Evidence<'a> {
             let mut put = |scale: usize, added: f64, log_determinant: f64, first: f64, variance: f64| {
                 let drop = base.drop + added;
                 let mut total = prior + self.log_ratio(drop, base.log_determinant + log_determinant);
-                total += candidates.log_odds[hypothesis] + libm::log(self.settings.prior.scales[scale][1]);
+                total += candidates.log_odds[hypothesis] + libm::log(self.settings.prior.scale_shares[scale]);
                 if signed {
                     total += log_allowed(first, libm::sqrt(self.level(drop) * variance));
                 }
@@ -289,7 +289,7 @@ impl<'a> Evidence<'a> {
             };
             if width == 1 {
                 let (left, right) = (marginal.own(hypothesis, 0, 0) - product(0, 0), right(0));
-                for (scale, [size, _]) in self.settings.prior.scales.iter().enumerate() {
+                for (scale, size) in self.settings.prior.scales.iter().enumerate() {
                     let precision = 1.0 / (size * size);
                     let diagonal = left + precision;
                     let coefficient = right / diagonal;
@@ -299,7 +299,7 @@ impl<'a> Evidence<'a> {
             }
             let left = DMatrix::from_fn(width, width, |i, j| marginal.own(hypothesis, i, j) - product(i, j));
             let right = DVector::from_fn(width, |i, _| right(i));
-            for (scale, [size, _]) in self.settings.prior.scales.iter().enumerate() {
+            for (scale, size) in self.settings.prior.scales.iter().enumerate() {
                 let precision = 1.0 / (size * size);
                 let mut matrix = left.clone();
                 for i in 0..width {

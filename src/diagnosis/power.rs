@@ -262,7 +262,7 @@ impl<'a> Bench<'a> {
             .flat_map(|(member, scale)| {
                 self.candidates
                     .columns(*member)
-                    .map(|column| (column, 1.0 / (self.settings.prior.scales[*scale][0] * self.settings.prior.scales[*scale][0])))
+                    .map(|column| (column, 1.0 / (self.settings.prior.scales[*scale] * self.settings.prior.scales[*scale])))
             })
             .collect();
         if !fitted.is_empty() {
@@ -289,7 +289,7 @@ impl<'a> Bench<'a> {
             axes.view_mut((first, first), (width, width)).copy_from(&vectors);
             let log_odds = self.candidates.log_odds[hypothesis];
             let mut constant = [if log_odds.is_finite() { log_odds } else { OUT_OF_PLAY }; SCALES];
-            for (scale, [size, share]) in self.settings.prior.scales.iter().enumerate() {
+            for (scale, (size, share)) in self.settings.prior.scales.iter().zip(&self.settings.prior.scale_shares).enumerate() {
                 constant[scale] += libm::log(*share);
                 for (i, value) in values.iter().enumerate() {
                     inverse[first + i][scale] = 1.0 / (value + 1.0 / (size * size));

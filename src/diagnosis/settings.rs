@@ -120,9 +120,11 @@ settings! {
         unnamed: f64 = 0.25,
         /// λ at the upper end of the realistic range below which a hypothesis has no information in the data.
         no_information: f64 = 4.0,
-        /// Standard deviations of a magnitude in units of its usual one, and how likely each is: usual; several times as large; of a desktop
-        /// arm; of a hobby or cable-driven arm.
-        scales: [[f64; 2]; SCALES] = [[1.0, 0.44], [2.5, 0.44], [12.0, 0.10], [150.0, 0.02]],
+        /// Standard deviations of a magnitude in units of its usual one: of usual arms, of worse ones, of desktop arms, of hobby and
+        /// cable-driven arms.
+        scales: [f64; SCALES] = [1.0, 2.5, 12.0, 150.0],
+        /// How likely each of them is.
+        scale_shares: [f64; SCALES] = [0.44, 0.44, 0.10, 0.02],
     }
 
     /// The search over sets of effects.

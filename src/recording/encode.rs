@@ -112,14 +112,14 @@ impl Encoder {
             Event::Measured(measurement) => self.measured(measurement, &mut messages)?,
             Event::Identified(identification) => self.identified(identification, &mut messages)?,
             Event::Diagnosed(diagnosis) => messages.json(Topic::Diagnosis, diagnosis.as_ref())?,
-            Event::Note(note) => messages.protobuf(Topic::Log, &self.log(NOTE, note)),
-            Event::NotDiagnosed(reason) => messages.protobuf(Topic::Log, &self.log(NOT_DIAGNOSED, reason)),
+            Event::Note(note) => messages.protobuf(Topic::Log, &self.log_message(NOTE, note)),
+            Event::NotDiagnosed(reason) => messages.protobuf(Topic::Log, &self.log_message(NOT_DIAGNOSED, reason)),
         }
         self.event = self.event.saturating_add(1);
         Ok(messages.list)
     }
 
-    fn log(&self, name: &str, message: &str) -> Log {
+    fn log_message(&self, name: &str, message: &str) -> Log {
         Log {
             timestamp: Some(timestamp(self.now_ns)),
             level: log::Level::Info as i32,

@@ -513,7 +513,18 @@ pub fn read(path: &Path) -> Result<Recording, ReadError> {
             // Derived from the events above, or of a version to come.
             _ => continue,
         };
-        events.push(event.map_err(|reason| messages.content_error(&message, reason))?);
+        match event {
+            Ok(event) => events.push(event),
+            Err(reason) => {
+                let error = messages.content_error(&message, reason);
+                // What cannot be understood because a piece before it is damaged ends there.
+                messages.by_ref().for_each(drop);
+                if messages.cut().is_none() {
+                    return Err(error);
+                }
+                break;
+            }
+        }
         last = Some(message.event);
     }
     let version_warning = version_warning(path, &start.version);
