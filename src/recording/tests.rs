@@ -994,7 +994,7 @@ fn a_measurement_without_conditions_reads_as_without() {
         dwell_s: Some(2.0),
         session: Some("1".to_owned()),
         target: Some("A".to_owned()),
-        unread: UNREAD,
+        unread: [false, false, true],
         ..expected
     };
     let mut described: Vec<String> = schema["properties"].as_object().unwrap().keys().cloned().collect();
