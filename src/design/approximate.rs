@@ -750,7 +750,7 @@ mod tests {
     }
 
     fn paper() -> crate::scene::Scene {
-        crate::scene::read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/paper.toml")).unwrap().scene
+        crate::scene::read(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/paper.toml")).unwrap().scene
     }
 
     /// `count` random configurations within `share` of the limits.

@@ -175,7 +175,7 @@ mod tests {
     use crate::seed::stream;
 
     fn cell() -> SceneFile {
-        crate::scene::read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml")).unwrap()
+        crate::scene::read(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml")).unwrap()
     }
 
     /// What a small swarm finds and tells, with its evaluations and rejections.

@@ -15,7 +15,7 @@ const POOL: usize = 60;
 const CRITERIA: [Criterion; 3] = [Criterion::IOptimality, Criterion::Comprehensive, Criterion::Dispersion];
 
 fn scene(name: &str) -> Scene {
-    crate::scene::read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)).unwrap().scene
+    crate::scene::read(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)).unwrap().scene
 }
 
 /// What a search found and told: best value and configurations of every step, the values that it spent and what it refused.

@@ -2,7 +2,7 @@
 
 use super::detectability::Detectability;
 use super::outcome::{Candidate, Effect, Gap, NoiseSource, Place, Unknown, Verdict};
-use crate::effects::{Kind, Level, Location};
+use crate::effects::{Kind, Location};
 
 /// The verdict in a sentence.
 pub(super) fn sentence(

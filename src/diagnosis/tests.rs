@@ -18,7 +18,7 @@ const SIGMA: f64 = 20e-6;
 const ORIENTATION_SIGMA: f64 = 2e-5;
 
 fn arm() -> Arm {
-    scene::read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml")).unwrap().scene.arm
+    scene::read(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml")).unwrap().scene.arm
 }
 
 fn sensor() -> Sensor {

@@ -186,7 +186,7 @@ mod tests {
     use crate::seed::stream;
 
     fn paper() -> SceneFile {
-        crate::scene::read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/paper.toml")).unwrap()
+        crate::scene::read(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/paper.toml")).unwrap()
     }
 
     fn random_set(arm: &Arm, count: usize, label: &str) -> Vec<f64> {

@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn variances_are_those_of_the_covariance() {
-        let scene = crate::scene::read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml")).unwrap().scene;
+        let scene = crate::scene::read(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml")).unwrap().scene;
         let model = InformationModel::new(&scene.arm, &scene.sensor, scene.weights);
         let rank = model.rank();
         let mut stream = stream(4, "test/prediction");

@@ -21,7 +21,7 @@ fn main() {
 }
 
 fn scene(name: &str) -> SceneFile {
-    kincal::scene::read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)).expect("a shipped scene")
+    kincal::scene::read(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)).expect("a shipped scene")
 }
 
 fn evaluator(file: &SceneFile) -> Evaluator {

@@ -53,7 +53,7 @@ fn bound_of_all_configurations(bencher: Bencher) {
 }
 
 fn paper() -> SceneFile {
-    scene::read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/paper.toml")).expect("a shipped scene")
+    scene::read(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/paper.toml")).expect("a shipped scene")
 }
 
 /// Blocks of `count` free configurations of the paper's arm, and the mean of PᵀP over 200 others, P the rows of positions in

@@ -5,7 +5,7 @@ use crate::scene::SceneFile;
 use crate::seed::{Stream, stream};
 
 fn scene(name: &str) -> SceneFile {
-    crate::scene::read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)).unwrap()
+    crate::scene::read(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)).unwrap()
 }
 
 /// Values at up to `length` m and `angle` rad from nominal.

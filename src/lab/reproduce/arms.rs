@@ -65,7 +65,7 @@ mod tests {
     #[test]
     fn the_arms_of_the_program_are_those_of_the_files() {
         for (file, (name, _)) in arms().unwrap().iter().zip(SCENES) {
-            let read = scene::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
+            let read = scene::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
             assert_eq!((&file.scene, &file.injected), (&read.scene, &read.injected));
         }
     }

@@ -35,7 +35,7 @@ use super::true_arm::{Placement, TrueArm};
 use super::world::World;
 use crate::arm::JointKind;
 use crate::arm::frames::{Pose, rotation_from_vector};
-use crate::effects::{Level, Location};
+use crate::effects::Location;
 use crate::simulation::effect::Effect;
 
 /// The parts.
@@ -140,7 +140,7 @@ struct Checks<'a> {
 
 impl Checks<'_> {
     fn bad(&self, what: &'static str, got: f64, expected: &'static str) -> Result<(), PhysicsError> {
-        Err(PhysicsError::BadEffect { effect: self.effect, place: self.location, what, got, expected })
+        Err(PhysicsError::BadEffect { effect: self.effect, place: self.location.to_string(), what, got, expected })
     }
 
     fn require(&self, good: bool, what: &'static str, got: f64, expected: &'static str) -> Result<(), PhysicsError> {
