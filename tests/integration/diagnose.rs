@@ -198,7 +198,7 @@ fn x_and_y_alone_are_identified_and_diagnosed() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
     let table = out.join("table.csv").to_str().unwrap().to_owned();
-    let arm = kincal::scene::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml")).unwrap().scene.arm;
+    let arm = kincal::scene::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml")).unwrap().scene.arm;
     for all in [true, false] {
         let mut rows = clean_table(&arm, false, 0.05);
         for row in rows.iter_mut().filter(|row| all || row.index % 3 == 0) {
@@ -230,7 +230,7 @@ fn the_geometry_is_the_one_that_identify_fits() {
     let path = |name: &str| out.join(name).to_str().unwrap().to_owned();
     let scene = "scenes/arm8.toml".to_owned();
     kincal(out, &["export", &scene, "--to", "urdf"]).ends(0);
-    let arm = kincal::scene::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(&scene)).unwrap().scene.arm;
+    let arm = kincal::scene::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(&scene)).unwrap().scene.arm;
     for orientation in [false, true] {
         fs::write(path("table.csv"), kincal::measurement::table::write(&clean_table(&arm, orientation, 1.0)).unwrap()).unwrap();
         for robot in [path("arm8.urdf"), scene.clone()] {
