@@ -987,7 +987,6 @@ fn a_measurement_without_conditions_reads_as_without() {
     };
     assert_eq!(keys(&expected), ["index", "joints", "pose_id", "position_m", "role", "temperatures_c", "time_s"]);
     let all = Measurement {
-        unread: [false, false, true],
         orientation_xyzw: Some([0.0, 0.0, 0.0, 1.0]),
         approach: vec![1, -1],
         ambient_c: Some(20.0),
