@@ -2,8 +2,10 @@
 
 use super::Analysis;
 use super::claims::{claim, kind_name, place};
+use super::evidence::Evidence;
 use super::outcome::{MinimumDetectable, Place, Undetectable};
 use super::power::Bench;
+use super::products::Marginal;
 use super::search::Claim;
 use super::sentence::words;
 use crate::effects::{Kind, Load, Need};
@@ -31,7 +33,11 @@ pub(super) fn detectability(analysis: &Analysis<'_>, noise: f64) -> Detectabilit
             (None, None) => {}
         }
     }
-    let bench = Bench::new(&analysis.evidence, noise, &analysis.found.best);
+    let most = analysis.options.settings.power.readings;
+    let thinned = (analysis.linear.count() >= 2 * most).then(|| analysis.linear.thinned(most));
+    let marginal = thinned.as_ref().and_then(|products| Marginal::new(products, None, &analysis.linear.prior));
+    let evidence = Evidence { marginal: marginal.as_ref().unwrap_or(analysis.evidence.marginal), ..analysis.evidence };
+    let bench = Bench::new(&evidence, noise, &analysis.found.best);
     let powers: Vec<_> = claims.par_iter().map(|(_, _, variants)| bench.power(variants)).collect();
     let (mut undetectable, mut detectable) = (Vec::new(), Vec::new());
     let (mut seen, mut all) = (0.0, 0.0);

@@ -43,6 +43,16 @@ impl<'a> Linear<'a> {
         Products::new(self.rows, self.readings, self.candidates, &self.residual, fold, folds)
     }
 
+    /// Inner products of about `most` rows that stand for all: every second, third … in the order of the input.
+    #[must_use]
+    pub fn thinned(&self, most: usize) -> Products {
+        let every = self.count().div_ceil(most.max(1)).max(1);
+        let fold: Vec<usize> = (0..self.count()).map(|row| usize::from(row % every != 0)).collect();
+        let kept = fold.iter().filter(|fold| **fold == 0).count().max(1);
+        let count = self.count() as f64 / kept as f64;
+        Products::counted(self.rows, self.readings, self.candidates, &self.residual, &fold, 1, count)
+    }
+
     /// Rows.
     #[must_use]
     pub fn count(&self) -> usize {

@@ -17,6 +17,8 @@ use crate::numerics::gram;
 #[derive(Debug)]
 pub struct Products {
     folds: Vec<Fold>,
+    /// Whitened signatures, fold below fold.
+    signatures: DMatrix<f64>,
     geometry: usize,
     /// Columns of each hypothesis.
     columns: Vec<Range<usize>>,
@@ -29,8 +31,8 @@ pub struct Products {
 /// The rows of one fold.
 #[derive(Debug)]
 struct Fold {
-    /// Whitened signatures.
-    signatures: DMatrix<f64>,
+    /// Its equations among the rows of the signatures.
+    range: Range<usize>,
     /// Of the geometry.
     normal: DMatrix<f64>,
     /// Of the geometry with signatures and, last, the residual.
@@ -55,6 +57,35 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7])) + rest
 }
 
+/// Sums of products of `own` with the rows `range` of every column of `matrix`, added to `sums`: four columns at a time, as `own` is read
+/// once for all of them.
+fn add_dots(own: &[f64], matrix: &DMatrix<f64>, range: &Range<usize>, sums: &mut [f64]) {
+    let part = |number: usize| &column(matrix, number)[range.clone()];
+    let mut blocks = sums.chunks_exact_mut(4);
+    let mut number = 0;
+    for block in &mut blocks {
+        let columns = [part(number), part(number + 1), part(number + 2), part(number + 3)];
+        let mut lanes = [[0.0; 4]; 4];
+        let whole = own.len() / 4 * 4;
+        for at in (0..whole).step_by(4) {
+            for (lanes, column) in lanes.iter_mut().zip(columns) {
+                for lane in 0..4 {
+                    lanes[lane] += own[at + lane] * column[at + lane];
+                }
+            }
+        }
+        for ((sum, lanes), column) in block.iter_mut().zip(lanes).zip(columns) {
+            let rest: f64 = own[whole..].iter().zip(&column[whole..]).map(|(a, b)| a * b).sum();
+            *sum += (lanes[0] + lanes[2]) + (lanes[1] + lanes[3]) + rest;
+        }
+        number += 4;
+    }
+    for sum in blocks.into_remainder() {
+        *sum += dot(own, part(number));
+        number += 1;
+    }
+}
+
 fn column(matrix: &DMatrix<f64>, number: usize) -> &[f64] {
     let rows = matrix.nrows();
     &matrix.as_slice()[number * rows..(number + 1) * rows]
@@ -72,6 +103,20 @@ impl Products {
         fold: &[usize],
         folds: usize,
     ) -> Products {
+        Products::counted(rows, readings, candidates, residual, fold, folds, 1.0)
+    }
+
+    /// The same with each row counted `count` times: rows that stand for others.
+    #[must_use]
+    pub fn counted(
+        rows: &Rows,
+        readings: &[Reading],
+        candidates: &Candidates,
+        residual: &DVector<f64>,
+        fold: &[usize],
+        folds: usize,
+        count: f64,
+    ) -> Products {
         use rayon::prelude::*;
         let columns: Vec<Range<usize>> = (0..candidates.hypotheses.len()).map(|number| candidates.columns(number)).collect();
         let mut first_own = Vec::with_capacity(columns.len());
@@ -82,10 +127,22 @@ impl Products {
         }
         let of_fold = |number: usize| {
             let own_rows: Vec<usize> = (0..fold.len()).filter(|row| fold[*row] == number).collect();
-            Fold::new(rows, readings, candidates, residual, &own_rows, &columns)
+            Fold::new(rows, readings, candidates, residual, &own_rows, &columns, count)
         };
-        let folds: Vec<Fold> = (0..folds).into_par_iter().map(of_fold).collect();
-        Products { folds, geometry: rows.jacobian.ncols(), columns, first_own, rows: RwLock::default() }
+        let parts: Vec<(Fold, DMatrix<f64>)> = (0..folds).into_par_iter().map(of_fold).collect();
+        let equations = parts.iter().map(|(_, part)| part.nrows()).sum();
+        let mut signatures = DMatrix::zeros(equations, columns.last().map_or(0, |last| last.end));
+        let mut first = 0;
+        let folds = parts
+            .into_iter()
+            .map(|(fold, part)| {
+                let range = first..first + part.nrows();
+                signatures.rows_mut(first, part.nrows()).copy_from(&part);
+                first = range.end;
+                Fold { range, ..fold }
+            })
+            .collect();
+        Products { folds, signatures, geometry: rows.jacobian.ncols(), columns, first_own, rows: RwLock::default() }
     }
 
     /// Number of folds.
@@ -106,10 +163,10 @@ impl Products {
             return Arc::clone(row);
         }
         let width = self.width();
-        let mut row = Vec::with_capacity(width * self.folds.len());
-        for fold in &self.folds {
-            let own = column(&fold.signatures, number);
-            row.extend((0..width).map(|other| dot(own, column(&fold.signatures, other))));
+        let mut row = vec![0.0; width * self.folds.len()];
+        for (fold, sums) in self.folds.iter().zip(row.chunks_exact_mut(width.max(1))) {
+            let own = &column(&self.signatures, number)[fold.range.clone()];
+            add_dots(own, &self.signatures, &fold.range, sums);
         }
         let row = Arc::new(row);
         if let Ok(mut known) = self.rows.write() {
@@ -127,7 +184,8 @@ impl Fold {
         residual: &DVector<f64>,
         own_rows: &[usize],
         columns: &[Range<usize>],
-    ) -> Fold {
+        count: f64,
+    ) -> (Fold, DMatrix<f64>) {
         let orientation = rows.equations.has_orientation();
         let (geometry, width) = (rows.jacobian.ncols(), columns.last().map_or(0, |last| last.end));
         let equations = own_rows.iter().map(|row| rows.equations.of(*row).len()).sum();
@@ -136,8 +194,8 @@ impl Fold {
         let mut left = vec![0.0; equations];
         let mut to = 0;
         for row in own_rows {
-            let (from, count) = (rows.equations.of(*row).start, rows.equations.of(*row).len());
-            let mut values = vec![0.0; count];
+            let (from, number) = (rows.equations.of(*row).start, rows.equations.of(*row).len());
+            let mut values = vec![0.0; number];
             for parameter in 0..geometry {
                 values.iter_mut().enumerate().for_each(|(i, value)| *value = rows.jacobian[(from + i, parameter)]);
                 rows.whitening.apply(*row, &mut values);
@@ -155,8 +213,14 @@ impl Fold {
             }
             values.iter_mut().enumerate().for_each(|(i, value)| *value = residual[from + i]);
             rows.whitening.apply(*row, &mut values);
-            left[to..to + count].copy_from_slice(&values);
-            to += count;
+            left[to..to + number].copy_from_slice(&values);
+            to += number;
+        }
+        if count != 1.0 {
+            let root = libm::sqrt(count);
+            jacobian *= root;
+            signatures *= root;
+            left.iter_mut().for_each(|value| *value *= root);
         }
         let normal = gram(&jacobian);
         let mixed = DMatrix::from_fn(geometry, width + 1, |parameter, other| {
@@ -170,9 +234,9 @@ impl Fold {
             .collect();
         let with_residual = (0..width).map(|number| dot(column(&signatures, number), &left)).collect();
         // A row that counts half is half an equation.
-        let weight = |row: &usize| rows.equations.of(*row).len() as f64 * rows.whitening.weights()[*row];
+        let weight = |row: &usize| count * rows.equations.of(*row).len() as f64 * rows.whitening.weights()[*row];
         let equations = own_rows.iter().map(weight).sum();
-        Fold { residual: dot(&left, &left), signatures, normal, mixed, own, with_residual, equations }
+        (Fold { range: 0..0, residual: dot(&left, &left), normal, mixed, own, with_residual, equations }, signatures)
     }
 }
 
@@ -302,10 +366,8 @@ impl<'a> Marginal<'a> {
             }
         } else {
             // Of many columns, which no fold asks for.
-            for fold in &self.products.folds {
-                let own = column(&fold.signatures, number);
-                row.iter_mut().enumerate().for_each(|(other, sum)| *sum += dot(own, column(&fold.signatures, other)));
-            }
+            let all = &self.products.signatures;
+            add_dots(column(all, number), all, &(0..all.nrows()), &mut row);
         }
         let mixed = column(&self.mixed, number);
         for (other, value) in row.iter_mut().enumerate() {
@@ -400,7 +462,7 @@ pub(super) fn test_marginal(candidates: &Candidates, signatures: &DMatrix<f64>, 
     }
     let width = signatures.ncols();
     let fold = Fold {
-        signatures: signatures.clone(),
+        range: 0..signatures.nrows(),
         normal: DMatrix::zeros(0, 0),
         mixed: DMatrix::zeros(0, width + 1),
         own,
@@ -408,5 +470,12 @@ pub(super) fn test_marginal(candidates: &Candidates, signatures: &DMatrix<f64>, 
         residual: residual.norm_squared(),
         equations: signatures.nrows() as f64,
     };
-    TestProducts(Products { folds: vec![fold], geometry: 0, columns, first_own, rows: RwLock::default() })
+    TestProducts(Products {
+        folds: vec![fold],
+        signatures: signatures.clone(),
+        geometry: 0,
+        columns,
+        first_own,
+        rows: RwLock::default(),
+    })
 }

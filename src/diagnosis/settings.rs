@@ -230,6 +230,8 @@ settings! {
     Power {
         /// Share of cases in which the least magnitude is named.
         share: f64 = 0.8,
+        /// Readings that stand for all, where there are many more: what would have shown hangs on them evenly.
+        readings: usize = 150,
         /// Draws of a claim, shared by its variants.
         draws: usize = 192,
         /// Variants of a claim that are taken as the truth.

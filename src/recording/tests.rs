@@ -564,7 +564,8 @@ fn arbitrary_bytes_never_panic() {
         }
         noise.truncate(stream.uniform(0.0, 1.5 * noise.len() as f64) as usize);
         fs::write(&path, &noise).unwrap();
-        let _ = read(&path).map(|recording| assert!(recording.cut.is_some()));
+        // A byte may be replaced by itself.
+        let _ = read(&path).map(|recording| assert!(recording.cut.is_some() || noise == bytes));
         let mut random: Vec<u8> = mcap::MAGIC.to_vec();
         random.extend(
             (0..300).map(|_| stream.uniform(0.0, 256.0) as u8 & if stream.uniform(0.0, 1.0) < 0.5 { 0x0f } else { 0xff }),
