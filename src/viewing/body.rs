@@ -1,9 +1,9 @@
 //! The arm and its cell as shapes, and the transforms that move them.
 
-use re_sdk::{EntityPath, RecordingStream, RecordingStreamResult, entity_path};
 use re_sdk_types::archetypes::{Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D, LineStrips3D, Transform3D, TransformAxes3D};
 use re_sdk_types::components::FillMode;
 use re_sdk_types::datatypes::Quaternion;
+use rerun::{EntityPath, RecordingStream, RecordingStreamResult, entity_path};
 
 use super::viewer::ViewerError;
 use crate::arm::ChainAt;

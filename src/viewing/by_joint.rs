@@ -2,9 +2,9 @@
 //! joint would move it, over that joint's coordinate. Play, ripple and lost motion of a joint show as a shape in its panel.
 
 use nalgebra::Vector3;
-use re_sdk::{RecordingStream, RecordingStreamResult};
 use re_sdk_types::archetypes::{LineStrips2D, Points2D};
 use re_sdk_types::components::Radius;
+use rerun::{RecordingStream, RecordingStreamResult};
 
 use super::summary::significant;
 use crate::arm::Arm;

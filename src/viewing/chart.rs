@@ -1,8 +1,8 @@
 //! The error of every configuration on a logarithmic scale, which Rerun's plots do not have: drawn in a plane.
 
-use re_sdk::{RecordingStream, RecordingStreamResult};
 use re_sdk_types::archetypes::{LineStrips2D, Points2D};
 use re_sdk_types::components::Radius;
+use rerun::{RecordingStream, RecordingStreamResult};
 
 const WIDTH: f64 = 160.0;
 const HEIGHT: f64 = 80.0;

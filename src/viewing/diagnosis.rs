@@ -1,9 +1,9 @@
 //! What causes the rest: residuals by cause in the cell, the waterfall as bars, the report.
 
 use nalgebra::Vector3;
-use re_sdk::{RecordingStream, RecordingStreamResult};
 use re_sdk_types::archetypes::{Arrows3D, LineStrips2D, Points2D, Points3D, TextDocument};
 use re_sdk_types::components::Radius;
+use rerun::{RecordingStream, RecordingStreamResult};
 
 use super::body::point;
 use super::picture::{metres, round};

@@ -3,9 +3,6 @@
 //! Written with the blueprint archetypes themselves, because the SDK's `Blueprint` type cannot set a view's properties (camera,
 //! legends, bounds). Its messages are the same.
 
-use re_sdk::EntityPath;
-use re_sdk::external::re_log_types::BlueprintActivationCommand;
-use re_sdk::{AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
 use re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend, TimePanelBlueprint, ViewBlueprint,
     ViewContents, ViewportBlueprint, VisualBounds2D as VisualBounds,
@@ -16,6 +13,9 @@ use re_sdk_types::blueprint::components::{
 };
 use re_sdk_types::components::{Name, Position3D, Vector3D};
 use re_sdk_types::datatypes::{Float32, Float64, Range1D, Range2D, Uuid};
+use rerun::EntityPath;
+use rerun::external::re_log_types::BlueprintActivationCommand;
+use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
 
 use super::{by_joint, chart, diagnosis, picture};
 use crate::design::problem::Method;

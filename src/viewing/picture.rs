@@ -7,13 +7,13 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use re_sdk::log::ChunkBatcherConfig;
-use re_sdk::sink::LogSink;
-use re_sdk::{RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
 use re_sdk_types::archetypes::{
     Arrows3D, LineStrips3D, Points3D, Scalars, SeriesLines, SeriesPoints, TextDocument, TextLog, TransformAxes3D,
 };
 use re_sdk_types::components::{Radius, TextLogLevel};
+use rerun::log::ChunkBatcherConfig;
+use rerun::sink::LogSink;
+use rerun::{RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
 use sha2::{Digest, Sha256};
 
 use super::body::{Body, point, transform};

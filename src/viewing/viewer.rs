@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, channel, sync_channel};
 use std::time::{Duration, Instant};
 
-use re_sdk::external::re_uri::{ProxyUri, RedapUri};
-use re_sdk::sink::{FileSink, GrpcSink, LogSink};
+use rerun::external::re_uri::{ProxyUri, RedapUri};
+use rerun::sink::{FileSink, GrpcSink, LogSink};
 
 use super::picture::Picture;
 use super::target::Target;
@@ -49,7 +49,7 @@ pub enum ViewerError {
     #[error(
         "there is no program `rerun` on PATH to show the run with; install it with `pip install rerun-sdk=={version}` or \
          `cargo install rerun-cli --version {version} --locked`, or write a file with FILE.rrd",
-        version = re_sdk::build_info().version
+        version = rerun::build_info().version
     )]
     NotInstalled,
     /// The viewer's program could not be started.
@@ -144,15 +144,15 @@ pub fn open(target: &Target, arm: &Arm, design: Option<&DesignProblem>, name: &s
     let (destination, sink): (Destination, Box<dyn LogSink>) = match target {
         Target::Off => return Ok(None),
         Target::Auto => {
-            if !listens(&SocketAddr::from(([127, 0, 0, 1], re_sdk::DEFAULT_SERVER_PORT)), PROBE) {
+            if !listens(&SocketAddr::from(([127, 0, 0, 1], rerun::DEFAULT_SERVER_PORT)), PROBE) {
                 return Ok(None);
             }
-            let url = re_sdk::DEFAULT_CONNECT_URL.to_owned();
+            let url = rerun::DEFAULT_CONNECT_URL.to_owned();
             let uri = proxy_uri(&url)?;
             (Destination::Stream(url), Box::new(GrpcSink::new(uri)))
         }
         Target::Connect(url) => {
-            let url = url.as_deref().map_or_else(|| re_sdk::DEFAULT_CONNECT_URL.to_owned(), full_url);
+            let url = url.as_deref().map_or_else(|| rerun::DEFAULT_CONNECT_URL.to_owned(), full_url);
             let uri = proxy_uri(&url)?;
             probe(&uri, &url)?;
             (Destination::Stream(url), Box::new(GrpcSink::new(uri)))
@@ -209,19 +209,19 @@ fn probe(uri: &ProxyUri, url: &str) -> Result<(), ViewerError> {
 
 /// Starts a viewer, or finds one on the default port; returns its URL.
 fn spawn() -> Result<String, ViewerError> {
-    let default = SocketAddr::from(([127, 0, 0, 1], re_sdk::DEFAULT_SERVER_PORT));
+    let default = SocketAddr::from(([127, 0, 0, 1], rerun::DEFAULT_SERVER_PORT));
     if listens(&default, PROBE) {
-        return Ok(re_sdk::DEFAULT_CONNECT_URL.to_owned());
+        return Ok(rerun::DEFAULT_CONNECT_URL.to_owned());
     }
     if !is_on_path("rerun") {
         return Err(ViewerError::NotInstalled);
     }
-    let options = re_sdk::SpawnOptions { hide_welcome_screen: true, wait_for_bind: true, ..Default::default() };
-    re_sdk::spawn(&options).map_err(|error| ViewerError::Spawn(error.to_string()))?;
+    let options = rerun::SpawnOptions { hide_welcome_screen: true, wait_for_bind: true, ..Default::default() };
+    rerun::spawn(&options).map_err(|error| ViewerError::Spawn(error.to_string()))?;
     if !listens(&default, CONNECT) {
         return Err(ViewerError::Spawn("it ended or does not listen; is there a screen it can open a window on?".to_owned()));
     }
-    Ok(re_sdk::DEFAULT_CONNECT_URL.to_owned())
+    Ok(rerun::DEFAULT_CONNECT_URL.to_owned())
 }
 
 fn is_on_path(program: &str) -> bool {
@@ -343,7 +343,7 @@ fn show(
     events: &Receiver<Event>,
     destination: &Destination,
 ) -> Result<(), ViewerError> {
-    let draw = |error: re_sdk::RecordingStreamError| ViewerError::Draw(error.to_string());
+    let draw = |error: rerun::RecordingStreamError| ViewerError::Draw(error.to_string());
     let Ok(first) = events.recv() else { return Ok(()) };
     let stream = picture.begin(&first, sink, destination.batch()).map_err(draw)?;
     picture.take(&stream, &first).map_err(draw)?;

@@ -104,7 +104,7 @@ fn every_large_dependency_stays_in_its_module() {
         ("parry3d", &["simulation/physics/", "arm/self_collision.rs"]),
         ("mcap", &["recording/"]),
         ("foxglove", &["recording/"]),
-        ("re_sdk", &["viewing/"]),
+        ("rerun", &["viewing/"]),
         ("clap", &["cli/"]),
         ("svg", &["figure/"]),
         ("tiny_skia", &["figure/"]),
