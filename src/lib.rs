@@ -2,8 +2,8 @@
 //! the measuring, identify the arm's geometry, and find out which effect causes what no geometry explains.
 //!
 //! Everything is in SI units and radians; transforms are named `a_from_b`; parameters keep one order everywhere, that of
-//! [`arm::Arm`]'s chain. Everything that is drawn comes from a seed, and the same input gives the same bytes on every machine,
-//! whatever the number of threads.
+//! [`arm::Arm`]'s chain. Everything that is drawn comes from a seed, and the same input gives the same bytes on one machine,
+//! whatever the number of threads (from machine to machine: aimed at, not proven).
 //!
 //! # Identify an arm from a table of readings
 //!
@@ -24,7 +24,7 @@
 //! # let hidden = Injected { noise: Noise::Declared { factor: 1.0 }, ..file.injected.unwrap() };
 //! # let chosen = session::design_and_tell(&scene, &mut Silent)?.configurations;
 //! # let (measured, _) = session::measure_design(&scene, &hidden, &chosen, &mut Silent)?;
-//! # let text = table::write(&measured)?;
+//! # let text = table::write(&measured, &scene.arm.slides())?;
 //! let nominal = urdf::import(&std::fs::read_to_string("scenes/panda.urdf")?, "panda.urdf", None, None)?.arm;
 //! let readings = table::parse(&text, "readings.csv")?.measurements; // or `table::read`, from the file
 //! let sensor = Sensor::uniform(15e-6, Some(60e-6)); // m and rad, one sigma per axis
@@ -96,7 +96,7 @@
 //! | [`scene`] | the TOML file that describes arm, sensor, task and, apart from them, what is hidden |
 //! | [`quality`] | what a set of configurations tells: observability, prediction, covering of the workspace |
 //! | [`mod@design`] | choosing configurations: problem, optimisers, outcome, advice whether choosing pays |
-//! | [`identification`] | geometry from readings: alignment, robust least squares, what can be told apart |
+//! | [`identification`] | geometry from readings: alignment, least squares, what can be told apart |
 //! | [`effects`] | the kinds of un-modelled effects and what each does to readings, in closed form |
 //! | [`diagnosis`] | which effects cause what calibration leaves, and what cannot be said |
 //! | [`simulation`] | the hidden cell: effects as mechanisms in rapier, temperatures, the sensor's noise |

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
 
-use super::chain::Chain;
+use super::chain::{Chain, JointKind};
 use super::frames::Pose;
 
 /// A nominal arm with everything that is known about it without measuring.
@@ -128,6 +128,12 @@ impl Arm {
     #[must_use]
     pub fn joint_count(&self) -> usize {
         self.chain.joints.len()
+    }
+
+    /// Which joints slide.
+    #[must_use]
+    pub fn slides(&self) -> Vec<bool> {
+        self.chain.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect()
     }
 
     /// Whether `joints` respects every limit.

@@ -7,7 +7,7 @@ use super::Outcome;
 use super::arguments::{ExportOptions, Format, Global};
 use super::input::{input_stem, is_recording};
 use super::output;
-use crate::arm::urdf;
+use crate::arm::{Arm, urdf};
 use crate::event::{self, Event};
 use crate::measurement::{Measurement, Sensor, table};
 use crate::{recording, scene, session};
@@ -51,36 +51,48 @@ fn from_recording(global: &Global, options: &ExportOptions) -> anyhow::Result<(&
     let start = &recording.start;
     let scene = || scene::parse(&start.scene, &format!("{} (scene)", path.display()));
     let measured = event::measurements(&recording.events);
+    let arm = || -> anyhow::Result<Arm> {
+        Ok(match &start.real {
+            Some(real) => {
+                let robot = session::real_robot(start, real).with_context(|| path.display().to_string())?;
+                session::real_arm(real, robot, &measured).with_context(|| path.display().to_string())?.arm
+            }
+            None => scene()?.scene.arm,
+        })
+    };
     match options.to {
         Format::Toml if start.scene.is_empty() => {
             bail!("{} is a recording of a real arm and holds no scene; export its urdf or its csv", path.display())
         }
         Format::Toml => Ok(("public.toml", scene()?.public_toml()?)),
         Format::Csv => {
-            if measured.is_empty() {
-                bail!("{} holds no measurements", path.display());
+            let designed = recording.events.iter().rev().find_map(|event| match event {
+                Event::Designed(outcome) => Some(outcome),
+                _ => None,
+            });
+            match designed {
+                Some(outcome) if measured.is_empty() => {
+                    return Ok(("csv", table::write_configurations(&outcome.configurations, &arm()?.slides())?));
+                }
+                None if measured.is_empty() => bail!("{} holds no measurements, and no design", path.display()),
+                _ => {}
             }
             if !start.scene.is_empty() {
                 output::note(global, &noise_options(&scene()?.scene.sensor, &measured));
             }
-            Ok(("csv", table::write(&measured)?))
+            Ok(("csv", table::write(&measured, &arm()?.slides())?))
         }
         Format::Urdf => {
             let identified = recording.events.iter().rev().find_map(|event| match event {
                 Event::Identified(identification) => Some(identification),
                 _ => None,
             });
-            let arm = &match &start.real {
-                Some(real) => {
-                    let robot = session::real_robot(start, real).with_context(|| path.display().to_string())?;
-                    session::real_arm(real, robot, &measured).with_context(|| path.display().to_string())?.arm
-                }
-                None => scene()?.scene.arm,
-            };
+            let arm = &arm()?;
             let text = match identified {
                 Some(identification) => {
                     let values: Vec<f64> = identification.parameters.iter().map(|parameter| parameter.identified).collect();
-                    urdf::export_with(arm, &values)?
+                    // The nominal arm may lie beside the recording, under its name.
+                    return Ok(("calibrated.urdf", urdf::export_with(arm, &values)?));
                 }
                 None => {
                     output::note(global, "note: the recording holds no identification; this is the nominal arm");

@@ -10,6 +10,8 @@ use super::arguments::{Global, IdentifyOptions};
 use super::input;
 use super::output::{self, Audience};
 use crate::arm::Arm;
+use crate::diagnosis::rows::check_robot;
+use crate::diagnosis::settings::Model;
 use crate::event::{self, Event, RealCell, Start};
 use crate::measurement::{Measurement, Role, table};
 use crate::progress::Progress as _;
@@ -67,6 +69,10 @@ fn real_cell(
     input::check_joints(&options.input, &measurements, joint_count)?;
     let measurements = with_evaluation(measurements, options, &nominal.0)?;
     let real = session::real_arm(real, nominal, &measurements).with_context(|| options.input.display().to_string())?;
+
+    // Parameters that are free enough explain wrong units, too.
+    let fitted: Vec<&Measurement> = measurements.iter().filter(|row| row.role == Role::Fit).collect();
+    check_robot(&real.arm, &real.sensor, &fitted, &Model::default()).with_context(|| options.input.display().to_string())?;
 
     let stem = input::input_stem(&options.input, "-identified");
     let mut audience = Audience::open(global, &real.arm, None, Some(&stem), &stem)?;

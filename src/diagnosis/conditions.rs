@@ -23,14 +23,16 @@ pub struct Conditions {
     pub times: Vec<f64>,
 }
 
-/// The conditions of `measurements`, whose geometry is `rows`, with the effects `present`, which answer to `loads`. Also what those do to
-/// the target of each row.
+/// The conditions of `measurements`, whose geometry is `rows`, with the effects `present`, which answer to `loads`. `upright`: the joints
+/// that are, where an earlier fit has told (what the library has must not change from fit to fit). Also what the effects do to the target
+/// of each row.
 #[must_use]
 pub(crate) fn conditions(
     measurements: &[&Measurement],
     rows: &Rows,
     present: &[Present],
     loads: Loads,
+    upright: Option<&[bool]>,
     settings: &Model,
 ) -> (Conditions, Vec<Displacement>) {
     let mut notes = Vec::new();
@@ -135,7 +137,8 @@ pub(crate) fn conditions(
     let unknown = |reading: &Reading, joint: usize| {
         reading.posture.torque(joint).abs() < settings.upright * reading.posture.moment_sigma(joint)
     };
-    let upright = (0..count).map(|joint| readings.iter().all(|reading| unknown(reading, joint))).collect();
+    let is_upright = |joint: usize| readings.iter().all(|reading| unknown(reading, joint));
+    let upright = upright.map_or_else(|| (0..count).map(is_upright).collect(), <[bool]>::to_vec);
     let margin = (total / 10).max(3);
     let span = total.saturating_sub(2 * margin);
     let stride = span.div_ceil(settings.change_points.max(1)).max(1);

@@ -8,7 +8,7 @@ use super::power::Bench;
 use super::products::Marginal;
 use super::search::Claim;
 use super::sentence::words;
-use crate::effects::{Kind, Load, Need};
+use crate::effects::{Kind, Load, Location, Need};
 
 /// What would show and what would not.
 pub(super) struct Detectability {
@@ -55,11 +55,13 @@ pub(super) fn detectability(analysis: &Analysis<'_>, noise: f64) -> Detectabilit
                 detectable.push(entry(String::new()));
             }
             Some(_) => {
-                let alike = power.alike.filter(|(_, likeness)| *likeness > 0.8).map(|(other, likeness)| {
-                    let that = &candidates.hypotheses[other];
-                    let words = words(kind_name(that.kind), &that.location);
-                    format!("cannot be told from {words} (likeness {:.2}) at a realistic size", libm::sqrt(likeness))
-                });
+                let alike = power.alike.filter(|(_, likeness)| *likeness > analysis.options.settings.power.likeness_said).map(
+                    |(other, likeness)| {
+                        let that = &candidates.hypotheses[other];
+                        let words = words(kind_name(that.kind), &that.location);
+                        format!("cannot be told from {words} (likeness {:.2}) at a realistic size", libm::sqrt(likeness))
+                    },
+                );
                 let reason = alike.unwrap_or_else(|| "a realistic size is lost in the noise, or geometry absorbs it".to_owned());
                 undetectable.push(entry(reason));
             }
@@ -70,6 +72,9 @@ pub(super) fn detectability(analysis: &Analysis<'_>, noise: f64) -> Detectabilit
     let joints = analysis.linear.rows.mechanism.joint_count();
     let mut missing = |kind: Kind, reason: &str| {
         for joint in 1..=joints {
+            if !analysis.options.wants(Some(kind), Location { level: kind.level(), index: Some(joint) }) {
+                continue;
+            }
             all += 1.0;
             undetectable.push(Undetectable {
                 kind,

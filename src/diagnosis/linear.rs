@@ -6,6 +6,7 @@ use super::evidence::Candidates;
 use super::products::{GeometryPrior, Products};
 use super::rows::Rows;
 use crate::effects::signature::shape::Reading;
+use crate::seed::stream;
 
 /// A linear problem: rows, what may be in them, and what is measured minus what geometry alone predicts.
 #[derive(Clone, Debug)]
@@ -43,12 +44,14 @@ impl<'a> Linear<'a> {
         Products::new(self.rows, self.readings, self.candidates, &self.residual, fold, folds)
     }
 
-    /// Inner products of about `most` rows that stand for all: every second, third … in the order of the input.
+    /// Inner products of `most` rows that stand for all, drawn by lot: a plan may take sides or payloads in turn.
     #[must_use]
     pub fn thinned(&self, most: usize) -> Products {
-        let every = self.count().div_ceil(most.max(1)).max(1);
-        let fold: Vec<usize> = (0..self.count()).map(|row| usize::from(row % every != 0)).collect();
-        let kept = fold.iter().filter(|fold| **fold == 0).count().max(1);
+        let mut order: Vec<usize> = (0..self.count()).collect();
+        stream(0, "diagnosis/thinned").shuffle(&mut order);
+        let kept = most.clamp(1, self.count());
+        let mut fold = vec![1; self.count()];
+        order[..kept].iter().for_each(|row| fold[*row] = 0);
         let count = self.count() as f64 / kept as f64;
         Products::counted(self.rows, self.readings, self.candidates, &self.residual, &fold, 1, count)
     }

@@ -83,13 +83,15 @@ impl Options {
         Options { noise, without: Vec::new(), only: None, settings: Settings::default() }
     }
 
+    /// Whether `kind` (`None`: a shape without a name) is looked for at `place`.
+    fn wants(&self, kind: Option<Kind>, place: Location) -> bool {
+        kind.is_none_or(|kind| !self.without.contains(&kind))
+            && self.only.as_ref().is_none_or(|only| only.iter().any(|one| Some(one.0) == kind && one.1 == place))
+    }
+
     /// What is looked for.
     fn hypotheses(&self, rows: &Rows, conditions: &Conditions, ripples: &[Ripple]) -> Vec<Hypothesis> {
-        let wanted = |hypothesis: &Hypothesis| {
-            let is = |(kind, place): &(Kind, Location)| hypothesis.kind == Some(*kind) && hypothesis.location == *place;
-            hypothesis.kind.is_none_or(|kind| !self.without.contains(&kind))
-                && self.only.as_ref().is_none_or(|only| only.iter().any(is))
-        };
+        let wanted = |hypothesis: &Hypothesis| self.wants(hypothesis.kind, hypothesis.location);
         let nameless = self.without.contains(&Kind::StrainWaveError);
         let scanned = ripples.iter().map(|found| ripple(found.joint, found.waves, nameless));
         library(&rows.mechanism, &conditions.columns).into_iter().chain(scanned).filter(wanted).collect()
@@ -146,6 +148,8 @@ struct State {
     scale: f64,
     /// Where loads act.
     loads: Loads,
+    /// Joints that stand upright, as the first pass found: members and coefficients are numbers in the library, which hangs on them.
+    upright: Option<Vec<bool>>,
 }
 
 impl State {
@@ -164,6 +168,7 @@ impl State {
             orientation: data.orientation.unwrap_or(1.0),
             scale: 1.0,
             loads: Loads::AsItStands,
+            upright: None,
         }
     }
 
@@ -182,6 +187,7 @@ impl State {
             members: pass.members.clone(),
             scale: pass.scale,
             loads: pass.loads,
+            upright: Some(pass.conditions.columns.upright.clone()),
             ..self.clone()
         }
     }
@@ -240,7 +246,6 @@ struct Pass {
 }
 
 impl Pass {
-    /// `pass`: number of the pass; the geometry's prior is chosen in the first ones.
     /// `number`: of the pass. The geometry's prior is chosen in the first ones, and few effects are looked for, so that the largest
     /// ones are taken as large as they are before anything is looked for beside them.
     fn new(data: &Data<'_>, state: &State, number: usize) -> Result<Pass, DiagnosisError> {
@@ -252,7 +257,8 @@ impl Pass {
         let readings =
             Readings { sensor, measurements, weights: &weights, displacement: &state.displacement, scatter: &state.scatter };
         let rows = rows::fit(data.arm, readings, &settings.model)?;
-        let (conditions, displaced) = conditions::conditions(measurements, &rows, &state.present, state.loads, &settings.model);
+        let (conditions, displaced) =
+            conditions::conditions(measurements, &rows, &state.present, state.loads, state.upright.as_deref(), &settings.model);
         let mut candidates = candidates(data.options.hypotheses(&rows, &conditions, &state.ripples));
         let scheme = held_out::schemes(measurements, &rows.targets, &data.groups, settings.validation.folds).swap_remove(0);
         // The effects found so far are taken out as large as they are on the arm as it is fitted now, and put back along their signatures.
@@ -307,7 +313,9 @@ impl Pass {
         let weighed = weights::weigh(&rows, &residual, &weights, &data.groups, &settings.noise);
         let total = linear.residual;
         let present = present(&candidates, &coefficients);
-        let made = |loads: Loads| conditions::conditions(measurements, &rows, &present, loads, &settings.model).1;
+        let made = |loads: Loads| {
+            conditions::conditions(measurements, &rows, &present, loads, state.upright.as_deref(), &settings.model).1
+        };
         let displacement = made(state.loads);
         let apart = |one: &[Displacement], other: &[Displacement]| {
             let change = |(a, b): (&Displacement, &Displacement)| libm::hypot(libm::hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
@@ -385,6 +393,7 @@ pub fn diagnose(
     options: &Options,
 ) -> Result<Diagnosis, DiagnosisError> {
     let settings = &options.settings;
+    settings.check()?;
     let data = Data::new(arm, sensor, measurements, options);
     let (state, pass) = settle(&data)?;
     let linear = pass.linear();
@@ -463,7 +472,9 @@ fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
             let known = state.orientation != 1.0;
             let ratio =
                 weights::orientation_over_position(&pass.rows, &pass.residual, known, &settings.noise).filter(|_| may_tell);
-            let more = ripple::scan(&linear, &pass.residual, evidence.noise_level(&pass.members), &settings.ripple);
+            let mut more = ripple::scan(&linear, &pass.residual, evidence.noise_level(&pass.members), &settings.ripple);
+            // Those that are not looked for stay out of the library, and come again.
+            more.retain(|found| !state.ripples.iter().any(|known| (known.joint, known.waves) == (found.joint, found.waves)));
             if !state.is_settled(&pass, sigma_m, &settings.model) || !more.is_empty() || ratio.is_some() {
                 state = state.after(&pass);
                 state.ripples.extend(more);
@@ -543,11 +554,12 @@ pub struct Singles {
 }
 
 impl Singles {
-    /// Prepares `measurements` as [`diagnose`] does in its first pass.
+    /// Prepares `measurements` as [`diagnose`] does, around no effect and the geometry's usual prior.
     ///
     /// # Errors
     /// As [`diagnose`].
     pub fn new(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], options: &Options) -> Result<Singles, DiagnosisError> {
+        options.settings.check()?;
         let data = Data::new(arm, sensor, measurements, options);
         let state = State::nominal(&data);
         Ok(Singles {

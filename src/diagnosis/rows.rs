@@ -23,6 +23,9 @@ pub enum DiagnosisError {
     /// The geometry cannot be fitted.
     #[error(transparent)]
     Geometry(#[from] GeometryError),
+    /// A setting is out of its range.
+    #[error(transparent)]
+    Setting(#[from] super::settings::NotAllowed),
     /// The fit went astray.
     #[error("no arm of this kind makes these readings: with base, target and geometry fitted, {rms_mm:.0} mm RMS remain. {hint}")]
     NotThisRobot {
@@ -132,6 +135,18 @@ pub struct Readings<'a> {
     pub displacement: &'a [Displacement],
     /// Joints that do not repeat.
     pub scatter: &'a [Scatter],
+}
+
+/// Whether `measurements` can be of `arm` at all, as its file and the table's units say.
+///
+/// # Errors
+/// If not: with what would explain it. Measurements that tell too little are no error here.
+pub fn check_robot(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], settings: &Model) -> Result<(), DiagnosisError> {
+    let weights = vec![1.0; measurements.len()];
+    match fit(arm, Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[] }, settings) {
+        Ok(_) | Err(DiagnosisError::Geometry(_)) => Ok(()),
+        Err(wrong) => Err(wrong),
+    }
 }
 
 /// Fits base, target and geometry of `arm` to `readings`. Sessions get bases of their own where that is worth it.

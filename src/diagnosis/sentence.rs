@@ -40,10 +40,11 @@ pub(super) fn sentence(
             100.0 * power.share
         ),
         Verdict::Explained => format!(
-            "Explained by {}: held-out RMS {} with geometry, {} with the cause.",
+            "Explained by {}: held-out RMS {} with geometry, {} with the cause{}.",
             list(effects),
             um(gap.geometry_rms_m),
-            um(gap.explained_rms_m)
+            um(gap.explained_rms_m),
+            if names(effects).len() > 1 { "s" } else { "" }
         ),
         Verdict::Ambiguous => {
             let candidates: Vec<String> = sets

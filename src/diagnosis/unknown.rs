@@ -29,7 +29,8 @@ pub(super) fn unknown(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFl
         let largest = unnamed.iter().take(decision.unknown_said);
         let mut said: Vec<String> = largest.map(|(of, rms_m)| format!("{} ({:.0} µm)", of.detail, *rms_m * 1e6)).collect();
         if unnamed.len() > decision.unknown_said {
-            said.push(format!("{} smaller ones", unnamed.len() - decision.unknown_said));
+            let more = unnamed.len() - decision.unknown_said;
+            said.push(format!("{more} smaller one{}", if more == 1 { "" } else { "s" }));
         }
         said.extend(analysis.scatter.iter().map(|one| one.detail(level, analysis.linear.rows.mechanism.slides[one.joint])));
         if structured {

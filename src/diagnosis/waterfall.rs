@@ -48,12 +48,13 @@ impl<'a> Waterfall<'a> {
         effects: &[Effect],
         settings: &'a Settings,
     ) -> Result<Self, DiagnosisError> {
+        settings.check()?;
         let total = measurements.len();
         let groups = groups(measurements, &settings.noise);
         let start = vec![1.0; total];
         let rows =
             rows::fit(arm, Readings { sensor, measurements, weights: &start, displacement: &[], scatter: &[] }, &settings.model)?;
-        let (conditions, _) = conditions::conditions(measurements, &rows, &[], Loads::AsItStands, &settings.model);
+        let (conditions, _) = conditions::conditions(measurements, &rows, &[], Loads::AsItStands, None, &settings.model);
         let scheme = held_out::schemes(measurements, &rows.targets, &groups, settings.validation.folds).swap_remove(0);
         let good = vec![true; total];
         let mut waterfall = Waterfall { arm, sensor, measurements, rows, conditions, scheme, weights: start, good, settings };
@@ -69,14 +70,15 @@ impl<'a> Waterfall<'a> {
             let outliers = outliers::look(&weighed.squares, &rows.equations.counts(), &settings.outliers).rows;
             waterfall.good = (0..total).map(|row| !outliers.contains(&row)).collect();
             waterfall.weights = weighed.far.iter().zip(&weighed.dependent).map(|(a, b)| a * b).collect();
-            waterfall.conditions = conditions::conditions(measurements, &rows, &[], Loads::AsItStands, &settings.model).0;
+            waterfall.conditions = conditions::conditions(measurements, &rows, &[], Loads::AsItStands, None, &settings.model).0;
             waterfall.rows = rows;
         }
         Ok(waterfall)
     }
 
     /// What all of `effects` that have a formula do together (of each reading: shift of the target in m, turn in rad, in root), as large as
-    /// they are: loads are those of the arm as it stands with them.
+    /// they are: loads are those of the arm as it stands with them, also where the diagnosis found that the readings already say where it
+    /// stands.
     #[must_use]
     pub fn together(&self, effects: &[Effect]) -> Vec<Displacement> {
         let present = |reading: &Reading| -> Vec<Present> {

@@ -215,11 +215,17 @@ fn above_zero_kelvin(value: f64) -> Result<f64, String> {
     if value > -273.15 { Ok(value) } else { Err(format!("is {value} °C; more than -273.15 is needed")) }
 }
 
-/// Writes `measurements` in the format that [`parse`] reads, bit for bit. Columns that some rows lack are left out.
+/// The column of a joint (from 0).
+fn joint_column(joint: usize, slides: &[bool]) -> String {
+    format!("q{}_{}", joint + 1, if slides.get(joint).copied().unwrap_or(false) { "m" } else { "rad" })
+}
+
+/// Writes `measurements` in the format that [`parse`] reads, bit for bit. Columns that some rows lack are left out. `slides`: which joints
+/// slide.
 ///
 /// # Errors
 /// If a text cannot be written as CSV, which none that [`parse`] gave causes.
-pub fn write(measurements: &[Measurement]) -> Result<String, csv::Error> {
+pub fn write(measurements: &[Measurement], slides: &[bool]) -> Result<String, csv::Error> {
     let every = |has: fn(&Measurement) -> bool| measurements.iter().all(has);
     let joints = measurements.first().map_or(0, |row| row.joints.len());
     let sensors = measurements.iter().map(|row| row.temperatures_c.len()).min().unwrap_or(0);
@@ -235,7 +241,7 @@ pub fn write(measurements: &[Measurement]) -> Result<String, csv::Error> {
     let names =
         |present: bool, names: &[&str]| if present { names.iter().map(|name| (*name).to_owned()).collect() } else { Vec::new() };
     let mut header = names(true, &["pose_id", "role", "time_s"]);
-    header.extend((1..=joints).map(|joint| format!("q{joint}_rad")));
+    header.extend((0..joints).map(|joint| joint_column(joint, slides)));
     let axes: Vec<usize> = (0..3).filter(|axis| measurements.iter().any(|row| !row.unread[*axis])).collect();
     header.extend(axes.iter().map(|axis| ["x_m", "y_m", "z_m"][*axis].to_owned()));
     header.extend(names(orientation, &["qx", "qy", "qz", "qw"]));
@@ -257,6 +263,22 @@ pub fn write(measurements: &[Measurement]) -> Result<String, csv::Error> {
             [number(row.ambient_c), number(row.payload_kg), number(row.dwell_s), row.session.clone(), row.target.clone()];
         fields.extend(optional.iter().zip(values).filter(|((_, present), _)| *present).filter_map(|(_, value)| value));
         writer.write_record(&fields)?;
+    }
+    let bytes = writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// Writes configurations (rad; m where a joint of `slides` slides), one per row, as the columns `pose_id`, `q1_rad` … that [`parse`] reads:
+/// what was read of the target is to be added.
+///
+/// # Errors
+/// None in practice.
+pub fn write_configurations(configurations: &[Vec<f64>], slides: &[bool]) -> Result<String, csv::Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let joints = (0..slides.len()).map(|joint| joint_column(joint, slides));
+    writer.write_record(["pose_id".to_owned()].into_iter().chain(joints))?;
+    for (pose, joints) in configurations.iter().enumerate() {
+        writer.write_record([pose.to_string()].into_iter().chain(joints.iter().map(f64::to_string)))?;
     }
     let bytes = writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
@@ -352,7 +374,26 @@ fn column(name: &str) -> Result<Column, String> {
     if let Some(component) = ["qx", "qy", "qz", "qw"].iter().position(|known| *known == name) {
         return Ok(Column::Quaternion { component });
     }
-    let unknown = || Err(format!("unknown column `{name}`; known are {ALLOWED}"));
+    let unknown = || {
+        Err(match name {
+            "" => "a column without a name: is there a comma at the end of the line?".to_owned(),
+            _ if name.contains([';', '\t']) => {
+                "the columns are separated by semicolons or tabs: separate them by commas, with decimal \
+                 points"
+                    .to_owned()
+            }
+            _ if name.parse::<f64>().is_ok() => {
+                format!("a number (`{name}`) where the names of the columns should be: the header is missing")
+            }
+            _ if name != name.to_lowercase() && column(&name.to_lowercase()).is_ok() => {
+                format!("unknown column `{name}`; write `{}`", name.to_lowercase())
+            }
+            _ => format!("unknown column `{name}`: rename it, or take it out; known are {ALLOWED}"),
+        })
+    };
+    if name.is_empty() || name.contains([';', '\t']) || name.parse::<f64>().is_ok() {
+        return unknown();
+    }
     if let Some(axis) = ["x", "y", "z"].iter().position(|axis| name == *axis || name.starts_with(&format!("{axis}_"))) {
         return match &name[1..] {
             "_m" => Ok(Column::Position { axis, factor: 1.0 }),
@@ -424,7 +465,7 @@ mod tests {
             target: Some("A".to_owned()),
         };
         let rows = vec![row(0), row(1), row(2)];
-        assert_eq!(parse(&write(&rows).unwrap(), "t.csv").unwrap().measurements, rows);
+        assert_eq!(parse(&write(&rows, &[]).unwrap(), "t.csv").unwrap().measurements, rows);
         // A coordinate that some rows lack is an empty cell, one that all lack no column.
         let flat = |index: usize, of: &[usize]| Measurement {
             unread: [0, 1, 2].map(|axis| of.contains(&axis)),
@@ -432,13 +473,13 @@ mod tests {
             ..row(index)
         };
         for rows in [vec![flat(0, &[2]), flat(1, &[2])], vec![flat(0, &[2]), flat(1, &[]), flat(2, &[0])]] {
-            let text = write(&rows).unwrap();
+            let text = write(&rows, &[]).unwrap();
             assert_eq!(text.contains("z_m"), rows.len() == 3);
             assert_eq!(parse(&text, "t.csv").unwrap().measurements, rows);
         }
         // What only some rows have is left out.
         let some = vec![Measurement { payload_kg: None, approach: Vec::new(), ..row(0) }, row(1)];
-        let back = parse(&write(&some).unwrap(), "t.csv").unwrap();
+        let back = parse(&write(&some, &[]).unwrap(), "t.csv").unwrap();
         assert_eq!(back.measurements[1], Measurement { payload_kg: None, approach: Vec::new(), ..row(1) });
     }
 
@@ -452,7 +493,11 @@ mod tests {
             ("q1_rad,x_m,x_mm\n0,0,0\n", "needs x_m, y_m, z_m (or _mm), those that were read, each once"),
             ("q1_rad,x_m,y_m\n0,0,0\n0,,\n", "line 3: none of x, y, z was read"),
             ("q1_rad,q3_rad,x_m,y_m,z_m\n", "q2 is missing or doubled"),
-            ("q1_rad,x_m,y_m,z_m,colour\n", "unknown column `colour`; known are pose_id"),
+            ("q1_rad;x_m;y_m;z_m\n0;0;0;0\n", "line 1: the columns are separated by semicolons or tabs"),
+            ("0.3,1,2,3\n", "line 1: a number (`0.3`) where the names of the columns should be"),
+            ("q1_rad,x_m,y_m,z_m,\n", "line 1: a column without a name"),
+            ("Q1_RAD,x_m,y_m,z_m\n", "line 1: unknown column `Q1_RAD`; write `q1_rad`"),
+            ("q1_rad,x_m,y_m,z_m,colour\n", "unknown column `colour`: rename it, or take it out; known are pose_id"),
             ("q1_rad,x_m,y_m,z_m,qx\n", "an orientation needs all of qx, qy, qz, qw"),
             ("q1_rad,x_m,y_m,z_m\n0,0,0,0\n0,0,NaN,0\n", "line 3: `y_m` is `NaN`; a finite number is needed"),
             ("q1_rad,x_m,y_m,z_m\n0,0,0\n", "line 2: 3 values, but the header names 4 columns"),

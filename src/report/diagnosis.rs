@@ -216,7 +216,9 @@ fn picture(map: &Map) -> String {
 /// Kinds with the places at which they cannot be seen.
 fn blind(diagnosis: &Diagnosis) -> String {
     let mut kinds: Vec<(Kind, Vec<String>)> = Vec::new();
-    for one in &diagnosis.undetectable {
+    // What was seen although four of five such arms would not have shown it, was seen.
+    let seen = |kind, place| diagnosis.effects.iter().any(|effect| effect.kind == kind && effect.location == place);
+    for one in diagnosis.undetectable.iter().filter(|one| !seen(one.kind, one.location)) {
         let whole = if one.location.level == Level::Link { "whole arm" } else { "" };
         let index = one.location.index.map_or_else(|| whole.to_owned(), |index| index.to_string());
         match kinds.iter_mut().find(|(kind, _)| *kind == one.kind) {

@@ -70,6 +70,9 @@ pub(super) fn scene(file: &SceneToml) -> Checked<Scene> {
             "measure fewer configurations, or each less often",
         ));
     }
+    file.diagnosis
+        .check()
+        .map_err(|wrong| Invalid::new(wrong.key, wrong.found, wrong.allowed, "leave the line out for the usual value"))?;
     Ok(Scene {
         name: file.name.clone(),
         description: file.description.clone(),

@@ -351,7 +351,7 @@ fn tables_that_are_wrong() {
     with(rows[0].replace("x_m", "x_inch"), &["line 1", "x_inch"]);
     with(rows[0].replace("q3_rad", "q3"), &["line 1", "`q3` has no known unit"]);
     with(rows[0].replace("q3_rad,", ""), &["line 1", "q3 is missing"]);
-    with(table.replace(',', ";"), &["line 1", "unknown column"]);
+    with(table.replace(',', ";"), &["line 1", "separated by semicolons"]);
     with(value("x_m", "NaN"), &["line 3", "`x_m` is `NaN`", "a finite number"]);
     with(value("x_m", "1e300"), &["line 3", "1e300", "check the number"]);
     with(value("role", "test"), &["line 3", "`fit` or `held_out`"]);

@@ -204,7 +204,7 @@ fn x_and_y_alone_are_identified_and_diagnosed() {
         for row in rows.iter_mut().filter(|row| all || row.index % 3 == 0) {
             row.unread[2] = true;
         }
-        let text = kincal::measurement::table::write(&rows).unwrap();
+        let text = kincal::measurement::table::write(&rows, &[]).unwrap();
         assert_eq!(text.lines().next().unwrap().contains("z_m"), !all);
         fs::write(&table, text).unwrap();
         let run = |command: &str| {
@@ -232,7 +232,11 @@ fn the_geometry_is_the_one_that_identify_fits() {
     kincal(out, &["export", &scene, "--to", "urdf"]).ends(0);
     let arm = kincal::scene::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(&scene)).unwrap().scene.arm;
     for orientation in [false, true] {
-        fs::write(path("table.csv"), kincal::measurement::table::write(&clean_table(&arm, orientation, 1.0)).unwrap()).unwrap();
+        fs::write(
+            path("table.csv"),
+            kincal::measurement::table::write(&clean_table(&arm, orientation, 1.0), &arm.slides()).unwrap(),
+        )
+        .unwrap();
         for robot in [path("arm8.urdf"), scene.clone()] {
             let run = |command: &str| {
                 let noise = ["--position-noise-um", "20", "--attitude-noise-deg", "0.00573", "--json"];

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::arm::Arm;
+use crate::arm::ChainAt;
 use crate::arm::frames::Pose;
-use crate::arm::{ChainAt, JointKind};
 
 /// What an arm is made of, as far as signatures need it.
 #[derive(Clone, Debug)]
@@ -79,7 +79,7 @@ impl Mechanism {
                 None => (1.0, Point3::from(segments[joint + 1].translation.vector / 2.0)),
             })
             .collect();
-        let slides = arm.chain.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect();
+        let slides = arm.slides();
         Mechanism { chain: at, segments, slides, centres, masses_known, gravity: arm.gravity_in_base }
     }
 

@@ -33,7 +33,7 @@
 //! How exact it is (tests and `tests/benches/physics.rs`; eight joints, clearances to 60 µm and 200 µrad in all of them):
 //! without effects, forward kinematics to 2e-15 m. With clearance, the linear programme about the seat to 4e-11 m and 7e-8 rad (the
 //! latter is second order in the tilt), the one about the middle of the clearances to 0.2 µm and 0.4 µrad. Every effect against an
-//! independent solution: `experiments::effect_validation`, `kincal effects scenes/arm8.toml`.
+//! independent solution: `lab::effect_validation`, `kincal effects scenes/arm8.toml`.
 
 pub mod clearance;
 pub mod conditions;

@@ -1,4 +1,4 @@
-//! Tests of the effects that the comparison with statics (`experiments::effect_validation`) does not make: the way into a pose,
+//! Tests of the effects that the comparison with statics (`lab::effect_validation`) does not make: the way into a pose,
 //! bits, and what is refused.
 
 use nalgebra::Vector3;
