@@ -231,6 +231,10 @@ pub(super) fn conclude(
     }
     if degrees_of_freedom == 0 {
         notes.push("as many equations as parameters: nothing is left to tell how good the fit is".to_owned());
+    } else if degrees_of_freedom < rank {
+        notes.push(format!(
+            "only {degrees_of_freedom} equations more than parameters: the errors of the fitted readings are far smaller than those of others"
+        ));
     }
     let student = student_quantile(0.975, degrees_of_freedom.max(1) as f64).filter(|_| inflated);
     let quantile = student.unwrap_or(NORMAL_95);
@@ -310,7 +314,7 @@ pub(super) fn conclude(
                 ));
             }
         }
-        _ => notes.push("nothing is held out: the errors of fitted configurations flatter".to_owned()),
+        _ => notes.push("nothing is held out: the errors of fitted configurations are too optimistic".to_owned()),
     }
     Identification {
         converged: solved.converged && rank > 0 && !astray,
@@ -352,16 +356,6 @@ fn doubts(
     fitted: &Errors,
 ) -> Vec<String> {
     let mut doubts = Vec::new();
-    let changes = arm.chain.parameters.iter().zip(values).map(|(parameter, value)| (parameter, value - parameter.nominal));
-    let far = changes.max_by(|(_, a), (_, b)| a.abs().total_cmp(&b.abs()));
-    if let Some((parameter, change)) = far.filter(|(_, change)| change.abs() > ABSURD_CHANGE) {
-        doubts.push(format!(
-            "{} is {:.0} m{} from nominal: is it this robot, and are the units right?",
-            parameter.name,
-            change.abs() * 1e3,
-            parameter.quantity.unit()
-        ));
-    }
     let off = |measurement: &Measurement| difference(measurement, &predict(measurement)).fixed_rows::<3>(0).norm();
     let mut wild: Vec<(f64, &&Measurement)> = fit.iter().map(|measurement| (off(measurement), measurement)).collect();
     wild.sort_by(|(a, _), (b, _)| b.total_cmp(a));
@@ -371,13 +365,23 @@ fn doubts(
         .iter()
         .take_while(|(length, _)| *length > WILD * usual && *length > 1e-12)
         .take(5)
-        .map(|(length, row)| format!("{} (pose_id {}) by {:.3} mm", row.index, row.pose_id, length * 1e3))
+        .map(|(length, row)| format!("{} (pose_id {}) by {:.3} mm", row.index + 1, row.pose_id, length * 1e3))
         .collect();
     if !wild.is_empty() {
         doubts.push(format!(
-            "some readings are far off, the median being {:.3} mm: measurement {}; they pull the fit, look at them",
+            "some readings are far off, the median being {:.3} mm: reading {}; they pull the fit, look at them",
             usual * 1e3,
             wild.join(", ")
+        ));
+    }
+    let changes = arm.chain.parameters.iter().zip(values).map(|(parameter, value)| (parameter, value - parameter.nominal));
+    let far = changes.max_by(|(_, a), (_, b)| a.abs().total_cmp(&b.abs()));
+    if let Some((parameter, change)) = far.filter(|(_, change)| change.abs() > ABSURD_CHANGE) {
+        doubts.push(format!(
+            "{} is {:.0} m{} from nominal: is it this robot, and are the units right?",
+            parameter.name,
+            change.abs() * 1e3,
+            parameter.quantity.unit()
         ));
     }
     doubts

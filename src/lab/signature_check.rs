@@ -54,7 +54,7 @@ fn every_signature_is_what_physics_makes() {
         &Model::default(),
     )
     .unwrap();
-    let known = conditions(&rows, &fitted, &[], Loads::AsItStands, &Model::default()).0;
+    let known = conditions(&rows, &fitted, &[], Loads::AsItStands, None, &Model::default()).0;
     let library = library(&Mechanism::new(&scene.arm), &known.columns);
     for kind in Kind::known() {
         for place in places(kind, &scene.arm) {

@@ -349,6 +349,8 @@ fn tables_that_are_wrong() {
     with(rows[..3].join("\n"), &["measurements to fit", "at least 4"]);
     with(table.replace(",fit,", ",held_out,"), &["0 measurements to fit"]);
     with(rows[0].replace("x_m", "x_inch"), &["line 1", "x_inch"]);
+    let wrong_units = ["x_m", "y_m", "z_m"].iter().fold(table.clone(), |table, name| table.replace(name, &format!("{name}m")));
+    with(wrong_units, &["if the positions were metres in columns that say millimetres"]);
     with(rows[0].replace("q3_rad", "q3"), &["line 1", "`q3` has no known unit"]);
     with(rows[0].replace("q3_rad,", ""), &["line 1", "q3 is missing"]);
     with(table.replace(',', ";"), &["line 1", "separated by semicolons"]);

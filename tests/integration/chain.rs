@@ -1,5 +1,6 @@
 //! The whole chain, `kincal run`.
 
+use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
@@ -151,4 +152,27 @@ fn every_command_has_help_with_an_example() {
     }
     assert!(kincal(folder.path(), &["--help"]).ends(0).stdout.contains("Exit codes: 0"));
     assert!(kincal(folder.path(), &["--version"]).ends(0).stdout.starts_with("kincal "));
+}
+
+/// And the nominal arm stays as it was beside the calibrated one.
+#[test]
+fn a_design_comes_out_as_a_table_and_a_calibrated_arm_under_a_name_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    let random = ["scenes/arm8.toml", "--set", "design.method=random", "--json"];
+    let designed = kincal(out, &[&["design"], &random[..]].concat()).ends(0).json();
+    kincal(out, &["export", designed["recording"].as_str().unwrap(), "--to", "csv"]).ends(0);
+    let table = fs::read_to_string(out.join("arm8-design.csv")).unwrap();
+    let mut rows = table.lines();
+    assert_eq!(rows.next().unwrap(), "pose_id,q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,q7_rad,q8_rad");
+    let chosen = designed["design"]["configurations"].as_array().unwrap();
+    assert_eq!(rows.clone().count(), chosen.len());
+    for (row, joints) in rows.zip(chosen) {
+        let values = row.split(',').skip(1).map(|value| value.parse::<f64>().unwrap());
+        assert!(values.eq(joints.as_array().unwrap().iter().map(|value| value.as_f64().unwrap())), "{row}");
+    }
+    let run = quick_run(&[]);
+    let nominal = fs::read(run.path("arm8.urdf")).unwrap();
+    kincal(run.folder.path(), &["export", &run.text("arm8.mcap"), "--to", "urdf"]).ends(0);
+    assert!(fs::read(run.path("arm8.urdf")).unwrap() == nominal);
 }

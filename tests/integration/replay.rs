@@ -218,7 +218,7 @@ fn a_recording_of_a_table_replays_and_can_be_identified_and_exported() {
     assert_eq!(again["parameters"], first["parameters"]);
     assert_eq!(again["held_out"], first["held_out"]);
     // Its measurements and its calibrated arm come out as they went in; a scene it never had.
-    for (format, name, same) in [("csv", "csv", "table/arm8.csv"), ("urdf", "urdf", "table/arm8-identified.urdf")] {
+    for (format, name, same) in [("csv", "csv", "table/arm8.csv"), ("urdf", "calibrated.urdf", "table/arm8-identified.urdf")] {
         kincal(&run.path("exported"), &["export", recording, "--to", format]).ends(0);
         let read = |path: &str| fs::read(run.path(path)).unwrap();
         assert!(read(&format!("exported/arm8-identified.{name}")) == read(same), "{format}");
