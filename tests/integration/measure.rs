@@ -80,6 +80,25 @@ fn lines(text: &str, wanted: &[&str]) -> String {
     chosen.map(|line| format!("{}\n", line.trim_end())).collect()
 }
 
+/// In lines that fit the README.
+fn wrapped(text: &str) -> String {
+    let mut width = 0;
+    let word = |word: &str| {
+        let long = word.chars().count();
+        let breaks = width > 0 && width + 1 + long > 120;
+        let before = if breaks {
+            "\n"
+        } else if width > 0 {
+            " "
+        } else {
+            ""
+        };
+        width = if breaks { long } else { width + before.len() + long };
+        format!("{before}{word}")
+    };
+    text.split(' ').map(word).collect()
+}
+
 /// From the first line that contains `from` to the line before one that contains `to`, or to the end.
 fn part(text: &str, from: &str, to: &str) -> String {
     let lines = text.lines().skip_while(|line| !line.contains(from)).take_while(|line| to.is_empty() || !line.contains(to));
@@ -123,7 +142,7 @@ fn figures() {
         set(group, "held_out_identified", mm(&found, "/identification/held_out/position_m/rms"), "mm");
         set(group, "noise", mm(&found, "/identification/declared_noise/position_m"), "mm");
         let text = output(out, &arguments);
-        let sentence = found["diagnosis"]["sentence"].as_str().unwrap();
+        let sentence = wrapped(found["diagnosis"]["sentence"].as_str().unwrap());
         let errors = lines(&text, &["position mean (mm)", "held out (50)"]);
         let waterfall = lines(&text, &["held out, 5 folds", " geometry   ", "all that each fold uses", "noise floor"]);
         group.outputs.insert("summary".to_owned(), format!("{errors}\n{sentence}\n\n{waterfall}"));
