@@ -3,7 +3,7 @@
 use super::Analysis;
 use super::detectability::Detectability;
 use super::outcome::{Candidate, Verdict};
-use crate::effects::Kind;
+use crate::effects::{Kind, Need};
 
 /// What tells linear from saturating effects of load.
 const PAYLOADS: &str =
@@ -64,8 +64,7 @@ pub(super) fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], power: &Det
             ));
         }
     }
-    let thermal = [Kind::LinkThermalGrowth, Kind::JointThermalDrift];
-    if !power.detectable.iter().any(|one| thermal.contains(&one.kind)) {
+    if !power.detectable.iter().any(|one| one.kind.descriptor().needs.contains(&Need::Temperatures)) {
         let known = analysis.measurements.iter().any(|row| row.ambient_c.is_some() || !row.temperatures_c.is_empty());
         say(if known {
             "thermal effects could not show, for the temperature hardly changed: let the arm warm up and cool down in one session"

@@ -76,7 +76,7 @@ pub(crate) fn conditions(
                 spread = links.iter().zip(reference).fold(spread, |most, (now, then)| most.max((now - then).abs()));
             }
         }
-        if spread < 0.05 {
+        if spread < settings.temperature_k {
             temperature = false;
             notes.push("the temperature never changes: thermal effects cannot be looked for".to_owned());
         }

@@ -1,6 +1,7 @@
 //! Marginal likelihood of sets of effects, in closed form: linear in the magnitudes, Gaussian priors of physical size, noise level
 //! integrated out, geometry integrated out before (see [`super::products`]).
 
+use std::f64::consts::LN_2;
 use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -192,7 +193,7 @@ impl<'a> Evidence<'a> {
         for (hypothesis, scale) in members {
             total += self.candidates.log_odds[*hypothesis] + libm::log(self.settings.prior.scale_shares[*scale]);
             if one_signed(&self.candidates.hypotheses[*hypothesis]) {
-                total += log_allowed(model.coefficients[at], libm::sqrt(level * model.inverse[(at, at)]));
+                total += log_allowed(model.coefficients[at] / libm::sqrt(level * model.inverse[(at, at)]).max(1e-300));
             }
             at += self.candidates.columns(*hypothesis).len();
         }
@@ -283,7 +284,7 @@ impl<'a> Evidence<'a> {
                 let mut total = prior + self.log_ratio(drop, base.log_determinant + log_determinant);
                 total += candidates.log_odds[hypothesis] + libm::log(self.settings.prior.scale_shares[scale]);
                 if signed {
-                    total += log_allowed(first, libm::sqrt(self.level(drop) * variance));
+                    total += log_allowed(first / libm::sqrt(self.level(drop) * variance).max(1e-300));
                 }
                 found.push(Extension { member: (hypothesis, scale), log_posterior: total });
             };
@@ -319,11 +320,13 @@ impl<'a> Evidence<'a> {
     }
 }
 
-/// Logarithm of the share of the posterior that physics allows, over that of the prior (a half).
-fn log_allowed(mean: f64, sigma: f64) -> f64 {
-    let z = mean / sigma.max(1e-300);
-    // Below this the tail is so thin that its logarithm is what counts.
-    if z < -6.0 {
+/// Logarithm of the share of the posterior that physics allows (a magnitude above 0), over that of the prior (a half). `z`: the
+/// magnitude over its sigma.
+pub(super) fn log_allowed(z: f64) -> f64 {
+    // Far below, the tail is so thin that its logarithm is what counts.
+    if z > 6.0 {
+        LN_2
+    } else if z < -6.0 {
         -0.5 * z * z - libm::log(-z) - 0.919 + 0.693
     } else {
         libm::log(libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2))

@@ -4,11 +4,12 @@
 //! inner products of the residual with the signature and with those that are most alike. The same draws serve every magnitude. What
 //! is unlike the truth does not matter: it is as likely beside it as without it.
 
+use std::f64::consts::LN_2;
 use std::ops::Range;
 
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 
-use super::evidence::{Candidates, Evidence, NoisePrior, one_signed};
+use super::evidence::{Candidates, Evidence, NoisePrior, log_allowed, one_signed};
 use super::products::Marginal;
 use super::settings::{SCALES, Settings};
 use crate::numerics::transposed_product;
@@ -20,8 +21,6 @@ const COLUMNS: usize = 64;
 const NEGLIGIBLE: f64 = 9.0;
 /// Log prior odds of what is not in play.
 const OUT_OF_PLAY: f64 = -6.0;
-/// Logarithm of two: what a sign is worth at most.
-const LOG_2: f64 = std::f64::consts::LN_2;
 
 /// The power of a claim.
 #[derive(Clone, Debug, PartialEq)]
@@ -302,7 +301,7 @@ impl<'a> Bench<'a> {
                 signed: one_signed(&self.candidates.hypotheses[hypothesis]),
                 columns: first..first + width,
                 constant,
-                largest: constant.into_iter().fold(f64::NEG_INFINITY, f64::max) + LOG_2,
+                largest: constant.into_iter().fold(f64::NEG_INFINITY, f64::max) + LN_2,
             });
             first += width;
         }
@@ -422,17 +421,6 @@ fn normal_quantile(share: f64) -> f64 {
         }
     }
     0.5 * (low + high)
-}
-
-/// As in the evidence: logarithm of the share of the posterior that physics allows, over that of the prior.
-fn log_allowed(z: f64) -> f64 {
-    if z > 6.0 {
-        LOG_2
-    } else if z < -6.0 {
-        -0.5 * z * z - libm::log(-z) - 0.919 + 0.693
-    } else {
-        libm::log(libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2))
-    }
 }
 
 /// A sum of exponentials of what is claimed and of everything else, relative to the largest.

@@ -185,6 +185,8 @@ settings! {
         implausible: f64 = 12.0 => 1.0..=MANY,
         /// What remains (RMS) over the arm's reach beyond which it is another robot.
         astray: f64 = 0.05 => 1e-6..=MANY,
+        /// Change of a temperature within the session below which no thermal effect can be looked for, K.
+        temperature_k: f64 = 0.05 => 0.0..=100.0,
         /// Reach below which an arm counts as one of this reach there, m.
         small_arm_m: f64 = 0.1 => 1e-6..=MANY,
     }
