@@ -9,7 +9,10 @@ use crate::effects::signature::library::Hypothesis;
 use crate::effects::signature::shape::Family;
 
 /// The hypotheses with places for their columns; magnitudes are in units of the middle of what is realistic.
-pub(super) fn candidates(hypotheses: Vec<Hypothesis>) -> Candidates {
+/// `scanned`: those that scans have found.
+pub(super) fn candidates(mut hypotheses: Vec<Hypothesis>, scanned: Vec<Hypothesis>) -> Candidates {
+    let from = hypotheses.len();
+    hypotheses.extend(scanned);
     let mut first = Vec::new();
     let mut columns = 0;
     for hypothesis in &hypotheses {
@@ -18,7 +21,7 @@ pub(super) fn candidates(hypotheses: Vec<Hypothesis>) -> Candidates {
     }
     let unit = hypotheses.iter().map(|hypothesis| libm::sqrt(hypothesis.range[0] * hypothesis.range[1])).collect();
     let count = hypotheses.len();
-    Candidates { hypotheses, first, unit, log_odds: vec![0.0; count], active: vec![true; count] }
+    Candidates { hypotheses, first, unit, log_odds: vec![0.0; count], active: vec![true; count], scanned: from }
 }
 
 /// A class of hypotheses that share one prior: a kind, or a family of shapes without a name.

@@ -33,6 +33,8 @@ pub struct Candidates {
     pub log_odds: Vec<f64>,
     /// Whether it is in play.
     pub active: Vec<bool>,
+    /// From this number on they were not looked for before the readings were seen: scans of what remained have found them.
+    pub scanned: usize,
 }
 
 /// Logarithm of how much likelier a set of `count` effects is beforehand than their own odds say: any number of effects is as likely as
@@ -140,11 +142,15 @@ pub struct Extension {
 
 impl<'a> Evidence<'a> {
     fn solve(&self, members: &[(usize, usize)]) -> Option<Solved> {
+        self.solve_sized(members.iter().map(|(hypothesis, scale)| (*hypothesis, self.settings.prior.scales[*scale])))
+    }
+
+    /// `members`: hypotheses, each with the standard deviation of its coefficients over the noise's.
+    fn solve_sized(&self, members: impl Iterator<Item = (usize, f64)>) -> Option<Solved> {
         let (mut columns, mut precision) = (Vec::new(), Vec::new());
-        for (hypothesis, scale) in members {
-            for column in self.candidates.columns(*hypothesis) {
+        for (hypothesis, size) in members {
+            for column in self.candidates.columns(hypothesis) {
                 columns.push(column);
-                let size = self.settings.prior.scales[*scale];
                 precision.push(1.0 / (size * size));
             }
         }
@@ -198,6 +204,37 @@ impl<'a> Evidence<'a> {
             at += self.candidates.columns(*hypothesis).len();
         }
         total
+    }
+
+    /// Logarithm of the evidence of `others` with `hypothesis` over that of `others` alone, where its coefficients have the standard
+    /// deviation `size`; without any prior of it being there.
+    pub(super) fn log_gain(&self, others: &[(usize, usize)], hypothesis: usize, size: f64) -> f64 {
+        let sized = || others.iter().map(|(hypothesis, scale)| (*hypothesis, self.settings.prior.scales[*scale]));
+        let ratio =
+            |model: Option<Solved>| model.map_or(f64::NEG_INFINITY, |model| self.log_ratio(model.drop, model.log_determinant));
+        ratio(self.solve_sized(sized().chain([(hypothesis, size)]))) - ratio(self.solve_sized(sized()))
+    }
+
+    /// What survives of the geometry of what `those` of `members` do together, as a sum of squares in sigmas of the noise that
+    /// `members` leave.
+    pub(super) fn energy(&self, members: &[(usize, usize)], those: impl Fn(usize) -> bool) -> f64 {
+        let Some(model) = self.solve(members) else {
+            return 0.0;
+        };
+        let counts = members.iter().flat_map(|(hypothesis, _)| self.candidates.columns(*hypothesis).map(|_| those(*hypothesis)));
+        let own: Vec<(usize, f64)> = model
+            .columns
+            .iter()
+            .zip(model.coefficients.iter())
+            .zip(counts)
+            .filter(|(_, counts)| *counts)
+            .map(|((column, value), _)| (*column, *value))
+            .collect();
+        let sum = |(column, value): &(usize, f64)| {
+            let row = self.marginal.row(*column);
+            own.iter().map(|(other, of_other)| value * row[*other] * of_other).sum::<f64>()
+        };
+        own.iter().map(sum).sum::<f64>() / self.level(model.drop)
     }
 
     /// Logarithm of the marginal likelihood of the readings with `members`, up to what does not depend on members and on the

@@ -9,12 +9,14 @@ use nalgebra::{DVector, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::evidence::{Evidence, NoisePrior};
+use super::evidence::{Candidates, Evidence, NoisePrior};
 use super::groups::Groups;
 use super::linear::Linear;
 use super::products::{Marginal, Products};
+use super::ripple::{self, Ripple};
 use super::search::climb;
 use super::settings::{self, Settings};
+use crate::effects::signature::shape::Shape;
 use crate::measurement::Measurement;
 
 /// What one fold says.
@@ -210,7 +212,7 @@ impl Validation<'_> {
             .filter_map(|number| {
                 let rows: Vec<usize> =
                     (0..self.good.len()).filter(|row| scheme.fold[*row] == number && self.good[*row]).collect();
-                let fold = self.leave_out(products, number, &rows)?;
+                let fold = self.leave_out(products, scheme, number, &rows)?;
                 Some(Fold { name: scheme.names[number].clone(), ..fold })
             })
             .collect();
@@ -223,14 +225,14 @@ impl Validation<'_> {
     }
 
     /// `rows`: those of fold `number` that count.
-    fn leave_out(&self, products: &Products, number: usize, rows: &[usize]) -> Option<Fold> {
+    fn leave_out(&self, products: &Products, scheme: &Scheme, number: usize, rows: &[usize]) -> Option<Fold> {
         if rows.is_empty() {
             return None;
         }
         let linear = self.linear;
         let marginal = Marginal::new(products, Some(number), &linear.prior)?;
-        let evidence =
-            Evidence { marginal: &marginal, candidates: linear.candidates, noise: self.noise, settings: self.settings };
+        let candidates = self.candidates(&marginal, |row| scheme.fold[row] != number);
+        let evidence = Evidence { marginal: &marginal, candidates: &candidates, noise: self.noise, settings: self.settings };
         let (chosen, _) = climb(&evidence, &[], self.settings.search.most);
         let squares = |members: &[(usize, usize)]| {
             let coefficients = evidence.coefficients(members);
@@ -250,6 +252,37 @@ impl Validation<'_> {
             chosen: chosen.iter().map(|(hypothesis, _)| *hypothesis).collect(),
             used: 0,
         })
+    }
+
+    /// What is in play where only the rows that `counts` are known: of what scans of all readings have found only what a scan of these
+    /// rows finds, too.
+    fn candidates(&self, marginal: &Marginal<'_>, counts: impl Fn(usize) -> bool + Sync) -> Candidates {
+        let linear = self.linear;
+        let mut candidates = linear.candidates.clone();
+        let found = candidates.scanned..candidates.active.len();
+        let were_active = candidates.active[found.clone()].to_vec();
+        candidates.active[found.clone()].fill(false);
+        let mut members = Vec::new();
+        while found.clone().any(|number| were_active[number - found.start] && !candidates.active[number]) {
+            let evidence = Evidence { marginal, candidates: &candidates, noise: self.noise, settings: self.settings };
+            members = climb(&evidence, &members, self.settings.search.most).0;
+            let coefficients = evidence.coefficients(&members);
+            let residual = linear.left(&marginal.geometry(&coefficients), &linear.made(&coefficients));
+            let level = evidence.noise_level(&members);
+            let of_rows = Linear { candidates: &candidates, ..linear.clone() };
+            let again = ripple::scan(&of_rows, &residual, level, &counts, &self.settings.ripple);
+            let is_again = |number: &usize| {
+                let shape = candidates.hypotheses[*number].shape;
+                let same = |one: &Ripple| shape == Shape::Harmonic { joint: one.joint, order: f64::from(one.waves) };
+                were_active[number - found.start] && again.iter().any(same)
+            };
+            let more: Vec<usize> = found.clone().filter(is_again).collect();
+            if more.is_empty() {
+                break;
+            }
+            more.into_iter().for_each(|number| candidates.active[number] = true);
+        }
+        candidates
     }
 
     /// Base and target fitted to all other folds; sum of squares of the positions of `rows`.

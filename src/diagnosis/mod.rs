@@ -18,6 +18,7 @@ pub mod groups;
 pub mod held_out;
 mod linear;
 mod magnitude;
+mod misfit;
 pub mod mistake;
 mod naming;
 mod notes;
@@ -90,11 +91,12 @@ impl Options {
     }
 
     /// What is looked for.
-    fn hypotheses(&self, rows: &Rows, conditions: &Conditions, ripples: &[Ripple]) -> Vec<Hypothesis> {
+    fn candidates(&self, rows: &Rows, conditions: &Conditions, ripples: &[Ripple]) -> Candidates {
         let wanted = |hypothesis: &Hypothesis| self.wants(hypothesis.kind, hypothesis.location);
         let nameless = self.without.contains(&Kind::StrainWaveError);
         let scanned = ripples.iter().map(|found| ripple(found.joint, found.waves, nameless));
-        library(&rows.mechanism, &conditions.columns).into_iter().chain(scanned).filter(wanted).collect()
+        let library = library(&rows.mechanism, &conditions.columns).into_iter();
+        candidates(library.filter(wanted).collect(), scanned.filter(wanted).collect())
     }
 }
 
@@ -259,7 +261,7 @@ impl Pass {
         let rows = rows::fit(data.arm, readings, &settings.model)?;
         let (conditions, displaced) =
             conditions::conditions(measurements, &rows, &state.present, state.loads, state.upright.as_deref(), &settings.model);
-        let mut candidates = candidates(data.options.hypotheses(&rows, &conditions, &state.ripples));
+        let mut candidates = data.options.candidates(&rows, &conditions, &state.ripples);
         let scheme = held_out::schemes(measurements, &rows.targets, &data.groups, settings.validation.folds).swap_remove(0);
         // The effects found so far are taken out as large as they are on the arm as it is fitted now, and put back along their signatures.
         let mut total = rows.residual.clone();
@@ -399,7 +401,7 @@ pub fn diagnose(
     let linear = pass.linear();
     let marginal = Marginal::new(&pass.products, None, &linear.prior).ok_or(GeometryError::Degenerate)?;
     let evidence = Evidence { marginal: &marginal, candidates: &pass.candidates, noise: data.noise, settings };
-    let found = search::search(&evidence, &pass.members, settings.search.most);
+    let found = misfit::doubt(&evidence, search::search(&evidence, &pass.members, settings.search.most));
     let coefficients = evidence.coefficients(&found.best);
     let residual = linear.left(&marginal.geometry(&coefficients), &linear.made(&coefficients));
     let outliers = outliers_of(&data, &pass, &found);
@@ -472,7 +474,8 @@ fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
             let known = state.orientation != 1.0;
             let ratio =
                 weights::orientation_over_position(&pass.rows, &pass.residual, known, &settings.noise).filter(|_| may_tell);
-            let mut more = ripple::scan(&linear, &pass.residual, evidence.noise_level(&pass.members), &settings.ripple);
+            let mut more =
+                ripple::scan(&linear, &pass.residual, evidence.noise_level(&pass.members), &|_| true, &settings.ripple);
             // Those that are not looked for stay out of the library, and come again.
             more.retain(|found| !state.ripples.iter().any(|known| (known.joint, known.waves) == (found.joint, found.waves)));
             if !state.is_settled(&pass, sigma_m, &settings.model) || !more.is_empty() || ratio.is_some() {

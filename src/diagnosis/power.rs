@@ -545,6 +545,7 @@ mod tests {
             unit: vec![0.8; count],
             log_odds: (0..count).map(|number| -3.0 - 0.3 * number as f64).collect(),
             active: vec![true; count],
+            scanned: count,
         };
         (candidates, DMatrix::from_columns(&columns))
     }

@@ -21,12 +21,21 @@ pub(super) struct Ripple {
 }
 
 /// The strongest ripple of each joint in `residual` (m, rad), whose noise has the mean square `level` in declared sigmas; the strongest
-/// first, none that is weak or a candidate already.
-pub(super) fn scan(linear: &Linear<'_>, residual: &DVector<f64>, level: f64, settings: &settings::Ripple) -> Vec<Ripple> {
+/// first, none that is weak or a candidate in play already. `counts`: rows that are looked at.
+pub(super) fn scan(
+    linear: &Linear<'_>,
+    residual: &DVector<f64>,
+    level: f64,
+    counts: &(dyn Fn(usize) -> bool + Sync),
+    settings: &settings::Ripple,
+) -> Vec<Ripple> {
     use rayon::prelude::*;
     let (readings, candidates) = (linear.readings, linear.candidates);
     let geometry = linear.rows.jacobian.ncols();
-    let jacobian = linear.rows.whitening.of(&linear.rows.jacobian);
+    let mut jacobian = linear.rows.whitening.of(&linear.rows.jacobian);
+    for row in (0..readings.len()).filter(|row| !counts(*row)) {
+        linear.rows.equations.of(row).for_each(|equation| jacobian.row_mut(equation).fill(0.0));
+    }
     let residual = linear.in_sigmas(residual);
     let Some(normal) = Cholesky::new(gram(&jacobian) + DMatrix::identity(geometry, geometry)) else {
         return Vec::new();
@@ -35,7 +44,8 @@ pub(super) fn scan(linear: &Linear<'_>, residual: &DVector<f64>, level: f64, set
     let lower = normal.l();
     let joints = readings.first().map_or(0, |reading| reading.joints.len());
     let known = |joint: usize, waves: u16| {
-        candidates.hypotheses.iter().any(|hypothesis| hypothesis.shape == Shape::Harmonic { joint, order: f64::from(waves) })
+        let wave = Shape::Harmonic { joint, order: f64::from(waves) };
+        candidates.hypotheses.iter().zip(&candidates.active).any(|(of, active)| *active && of.shape == wave)
     };
     let mut found: Vec<Ripple> = (0..joints)
         .into_par_iter()
@@ -44,7 +54,7 @@ pub(super) fn scan(linear: &Linear<'_>, residual: &DVector<f64>, level: f64, set
             // Of each reading: what a unit turn of the joint does, against geometry, itself and the residual.
             let mut mixed = DMatrix::zeros(geometry, readings.len());
             let (mut own, mut with) = (vec![0.0; readings.len()], vec![0.0; readings.len()]);
-            for row in 0..readings.len() {
+            for row in (0..readings.len()).filter(|row| counts(*row)) {
                 let moved = linear.rows.whitening.of_row(row, linear.rows.moved(row, joint).as_view());
                 for (value, equation) in moved.iter().zip(linear.rows.equations.of(row)) {
                     own[row] += value * value;

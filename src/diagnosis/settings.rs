@@ -197,6 +197,9 @@ settings! {
         odds: f64 = 1.0 => 1e-12..=1e12,
         /// Share of shapes without a name.
         unnamed: f64 = 0.25 => SHARE,
+        /// Of what an unknown cause does, in squares: how much of it a signature at the same place may have by being the difference between
+        /// the cause and the shape that stands for it.
+        misfit: f64 = 0.05 => SHARE,
         /// λ at the upper end of the realistic range below which a hypothesis has no information in the data.
         no_information: f64 = 4.0 => 0.0..=MANY,
         /// Standard deviations of a magnitude in units of its usual one: of usual arms, of worse ones, of desktop arms, of hobby and
