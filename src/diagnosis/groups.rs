@@ -4,7 +4,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::conditions::centre;
-use super::outliers::{median, rare};
+use crate::solver::robust::{median, rare};
 use super::settings::Noise;
 use crate::arm::frames::rotation_vector;
 use crate::measurement::Measurement;

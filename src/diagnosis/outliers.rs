@@ -1,21 +1,7 @@
 //! Readings that are far off: their weights, and the evidence that there are any.
 
 use super::settings;
-
-/// Squares (in sigmas) beyond which one reading in a thousand lies where the noise is Gaussian, by the number of its equations.
-const RARE: [f64; 7] = [1.0, 10.83, 13.82, 16.27, 18.47, 20.52, 22.46];
-/// Medians of the same squares.
-const MEDIAN: [f64; 7] = [1.0, 0.455, 1.386, 2.366, 3.357, 4.351, 5.348];
-
-/// Beyond what one square in a thousand lies where `equations` numbers have Gaussian noise, in sigmas.
-pub(super) fn rare(equations: usize) -> f64 {
-    RARE[equations.min(RARE.len() - 1)]
-}
-
-/// The median of the squares of `equations` numbers with Gaussian noise, in sigmas.
-pub(super) fn median(equations: usize) -> f64 {
-    MEDIAN[equations.min(MEDIAN.len() - 1)]
-}
+use crate::solver::robust::{alone, level};
 
 /// What there is of outliers.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,25 +16,6 @@ pub struct Outliers {
     pub factor: f64,
     /// Rows that are more likely outliers than not by a hundred to one.
     pub rows: Vec<usize>,
-}
-
-/// The typical square of a good reading, over one sigma's. `counts`: equations of each.
-fn level(squares: &[f64], counts: &[usize]) -> f64 {
-    let mut sorted: Vec<f64> = squares.iter().zip(counts).map(|(square, count)| square / median(*count)).collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted[sorted.len() / 2].max(1e-12)
-}
-
-/// Weights of readings with these squared residuals, of so many equations each (Huber's, on the squares): one for all but rare ones.
-#[must_use]
-pub fn weights(squares: &[f64], counts: &[usize]) -> Vec<f64> {
-    let level = level(squares, counts);
-    // Twice as far off counts a quarter, then less and less: an outlier tells nothing.
-    let weight = |(square, count): (&f64, &usize)| {
-        let limit = rare(*count) * level;
-        if *square <= limit { 1.0 } else { (limit / square) * (limit / square) }
-    };
-    squares.iter().zip(counts).map(weight).collect()
 }
 
 /// The evidence for outliers among readings with these squared residuals, of so many equations each.

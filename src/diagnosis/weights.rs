@@ -5,10 +5,10 @@ use std::ops::Range;
 use nalgebra::DVector;
 
 use super::groups::{self, Groups, Repeats};
-use super::outliers;
 use super::rows::Rows;
 use super::settings::Noise;
 use crate::measurement::Sensor;
+use crate::solver::robust;
 
 /// Weights of readings, and what they come from.
 pub(super) struct Weighed {
@@ -31,7 +31,7 @@ pub(super) fn weigh(rows: &Rows, residual: &DVector<f64>, before: &[f64], groups
     let sigmas: Vec<f64> = (0..before.len()).flat_map(of_row).collect();
     let squares: Vec<f64> =
         (0..before.len()).map(|row| sigmas[equations.of(row)].iter().map(|value| value * value).sum::<f64>()).collect();
-    let far = outliers::weights(&squares, &equations.counts());
+    let far = robust::weights(&squares, &equations.counts());
     let near: Vec<bool> = far.iter().map(|weight| *weight > 0.5).collect();
     let (dependent, correlation) = groups::weights(groups, &sigmas, equations, &near, settings);
     Weighed { squares, far, dependent, correlation }
@@ -66,7 +66,7 @@ pub(super) fn orientation_over_position(rows: &Rows, residual: &DVector<f64>, kn
     let level = |part: &dyn Fn(usize) -> Range<usize>| {
         let square = |row: &usize| {
             let part = part(*row);
-            let usual = outliers::median(part.len()) * rows.whitening.weights()[*row];
+            let usual = robust::median(part.len()) * rows.whitening.weights()[*row];
             whitened.rows_range(part).norm_squared() / usual
         };
         let mut squares: Vec<f64> = counts.iter().map(square).collect();
