@@ -3,7 +3,6 @@
 use super::Analysis;
 use super::outcome::Place;
 use super::search::Claim;
-use crate::effects::Kind;
 use crate::effects::signature::shape::Shape;
 
 /// What hypothesis number `hypothesis` claims.
@@ -20,9 +19,4 @@ pub(super) fn place(analysis: &Analysis<'_>, hypothesis: usize) -> Place {
         _ => None,
     };
     Place { level: of.location.level, index: of.location.index, time_s }
-}
-
-/// The kind's name, or that it has none.
-pub(crate) fn kind_name(kind: Option<Kind>) -> &'static str {
-    kind.map_or("unknown", Kind::name)
 }

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
+use super::conclusion::Note;
 use super::deflection::{Deflected, Loads, Present, deflected};
 use super::rows::Rows;
 use super::settings::Model;
@@ -18,7 +19,7 @@ pub struct Conditions {
     /// What there is.
     pub columns: Columns,
     /// What is missing.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
     /// Time of each place in time, s.
     pub times: Vec<f64>,
 }
@@ -50,13 +51,13 @@ pub(crate) fn conditions(
 
     let approach = measurements.iter().all(|row| row.approach.len() == count);
     if !approach {
-        notes.push("no approach directions: backlash cannot be looked for".to_owned());
+        notes.push(Note::NoApproach);
     }
     let links = measurements.iter().all(|row| row.temperatures_c.len() >= count);
     let ambient = measurements.iter().all(|row| row.ambient_c.is_some());
     let mut temperature = links || ambient;
     if !links && ambient {
-        notes.push("no temperatures of the links: that of the air stands in for all of them".to_owned());
+        notes.push(Note::AirForLinks);
     }
     let temperatures = |row: &Measurement| -> (Vec<f64>, f64) {
         if links {
@@ -78,20 +79,16 @@ pub(crate) fn conditions(
         }
         if spread < settings.temperature_k {
             temperature = false;
-            notes.push("the temperature never changes: thermal effects cannot be looked for".to_owned());
+            notes.push(Note::ConstantTemperature);
         }
     } else {
-        notes.push("no temperatures: thermal effects cannot be looked for".to_owned());
+        notes.push(Note::NoTemperatures);
     }
     if measurements.iter().all(|row| row.payload_kg.is_none()) {
-        notes.push("no payload column: the arm is taken to carry nothing".to_owned());
+        notes.push(Note::NoPayload);
     }
     if !rows.mechanism.masses_known {
-        notes.push(
-            "the robot's file has no masses: each link is taken to weigh 1 kg in its middle, and magnitudes that are driven by load \
-             have no physical unit"
-                .to_owned(),
-        );
+        notes.push(Note::NoMasses);
     }
 
     let mut readings: Vec<Reading> = Vec::with_capacity(total);

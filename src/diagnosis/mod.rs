@@ -3,11 +3,13 @@
 //!
 //! Data ([`groups`], [`conditions`]) → a linear problem about the fitted geometry and the effects found so far ([`rows`], `linear`), made
 //! again until nothing changes → sets of effects with their probabilities, for which inner products suffice ([`products`], [`evidence`],
-//! [`search`]) → what they are worth on readings that were not used ([`held_out`]) → what is said ([`outcome`]).
+//! [`search`]) → what they are worth on readings that were not used ([`held_out`]) → what that comes to ([`conclusion`]), which
+//! [`crate::report::wording`] puts into words ([`outcome`]).
 
 mod advice;
 mod candidates;
 mod claims;
+pub mod conclusion;
 pub mod conditions;
 mod confusion;
 pub(crate) mod deflection;
@@ -31,7 +33,6 @@ mod ripple;
 pub mod rows;
 pub mod scatter;
 pub mod search;
-mod sentence;
 pub mod settings;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -49,13 +50,14 @@ use crate::effects::{Kind, Location};
 use crate::identification::geometry::GeometryError;
 use crate::measurement::{Measurement, Sensor};
 use candidates::{candidates, weigh};
+use conclusion::Conclusion;
 use conditions::Conditions;
 use deflection::{Loads, Present, present};
 use evidence::{Candidates, Evidence, Extension, NoisePrior};
 use groups::{Groups, Repeats};
 use held_out::{Block, HeldOut, Scheme, Validation};
 use linear::Linear;
-use outcome::{Diagnosis, NoiseSource};
+use outcome::NoiseSource;
 use products::{Marginal, Products};
 use ripple::Ripple;
 use rows::{DiagnosisError, Readings, Rows};
@@ -350,7 +352,7 @@ impl Pass {
     }
 }
 
-/// What was found, before it is put into words.
+/// What was found, before it is decided what that comes to.
 pub(crate) struct Analysis<'a> {
     pub(crate) linear: &'a Linear<'a>,
     pub(crate) conditions: &'a Conditions,
@@ -382,7 +384,7 @@ impl Analysis<'_> {
     }
 }
 
-/// Diagnoses `measurements` of `arm`, read by `sensor`.
+/// Diagnoses `measurements` of `arm`, read by `sensor`. [`crate::report::wording::diagnosis`] puts what it comes to into words.
 ///
 /// # Errors
 /// If the measurements cannot tell where the arm stands, or are not this robot's.
@@ -391,7 +393,7 @@ pub fn diagnose(
     sensor: &Sensor,
     measurements: &[&Measurement],
     options: &Options,
-) -> Result<Diagnosis, DiagnosisError> {
+) -> Result<Conclusion, DiagnosisError> {
     let settings = &options.settings;
     settings.check()?;
     let data = Data::new(arm, sensor, measurements, options);
@@ -442,7 +444,7 @@ pub fn diagnose(
         correlation: (data.groups.rows.len() < measurements.len()).then_some(pass.weighed.correlation),
         options,
     };
-    Ok(verdict::put(&analysis))
+    Ok(verdict::conclude(&analysis))
 }
 
 /// Fits around what is found until nothing changes: signatures are those of the fitted arm, readings that are far off from the best model

@@ -74,6 +74,6 @@ fn outliers(analysis: &Analysis<'_>, closing: &Closing<'_>, unknown: bool) -> Op
         held_out_rms_after_m: closing.explained(),
         gap_closed: None,
         folds: [0, closing.folds.len()],
-        detail: format!("noise about {} times that of the other readings", outliers.factor),
+        detail: String::new(),
     })
 }

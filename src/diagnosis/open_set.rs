@@ -3,6 +3,7 @@
 
 use nalgebra::Vector3;
 
+use super::conclusion::{Trend, Variable};
 use super::conditions::Conditions;
 use super::outcome::Map;
 use crate::effects::signature::shape::Reading;
@@ -13,15 +14,15 @@ use crate::seed::stream;
 pub struct Structure {
     /// Of there being none, the best of all tests accounted for.
     pub p_value: f64,
-    /// Where the strongest shows.
-    pub r#where: String,
+    /// The strongest.
+    pub strongest: Trend,
     /// By how many standard deviations it stands out.
     pub strength: f64,
 }
 
 /// Neighbours in a variable, and what they say.
 struct Order {
-    name: String,
+    variable: Variable,
     /// Rows from the smallest value on.
     rows: Vec<usize>,
 }
@@ -29,21 +30,21 @@ struct Order {
 /// Orders of the readings `rows` of `conditions` by everything that was recorded; as places in `rows`.
 fn orders(conditions: &Conditions, rows: &[usize]) -> Vec<Order> {
     let readings: Vec<&Reading> = rows.iter().map(|row| &conditions.readings[*row]).collect();
-    let by = |name: String, value: &dyn Fn(usize) -> f64| {
+    let by = |variable: Variable, value: &dyn Fn(usize) -> f64| {
         let mut rows: Vec<usize> = (0..readings.len()).collect();
         rows.sort_by(|a, b| value(*a).total_cmp(&value(*b)).then(a.cmp(b)));
-        Order { name, rows }
+        Order { variable, rows }
     };
     let mut orders = Vec::new();
     for joint in 0..conditions.columns.travel.len() {
-        orders.push(by(format!("the angle of joint {}", joint + 1), &|row| readings[row].joints[joint]));
-        orders.push(by(format!("the torque of joint {}", joint + 1), &|row| readings[row].posture.torque(joint)));
+        orders.push(by(Variable::Angle(joint + 1), &|row| readings[row].joints[joint]));
+        orders.push(by(Variable::Torque(joint + 1), &|row| readings[row].posture.torque(joint)));
     }
     if conditions.columns.time {
-        orders.push(by("time".to_owned(), &|row| readings[row].share));
+        orders.push(by(Variable::Time, &|row| readings[row].share));
     }
     if conditions.columns.temperature {
-        orders.push(by("temperature".to_owned(), &|row| readings[row].rise_k[0]));
+        orders.push(by(Variable::Temperature, &|row| readings[row].rise_k[0]));
     }
     orders
 }
@@ -112,11 +113,11 @@ pub fn structure(conditions: &Conditions, residual: &[Vector3<f64>], units: &[Ve
     let (at, strength) = strongest(&observed);
     let above = permuted.iter().filter(|values| strongest(values).1 >= strength).count();
     let per_order = 1 + joints;
-    let of = at % per_order;
-    let what = if of == 0 { "the residual".to_owned() } else { format!("the residual along joint {}", of) };
+    // The vector itself stands first.
+    let along = Some(at % per_order).filter(|joint| *joint > 0);
     Structure {
         p_value: (above + 1) as f64 / (permutations + 1) as f64,
-        r#where: format!("{what} follows {}", orders[at / per_order].name),
+        strongest: Trend { along, follows: orders[at / per_order].variable },
         strength,
     }
 }

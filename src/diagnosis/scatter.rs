@@ -29,15 +29,6 @@ pub struct Scatter {
     pub log_odds: f64,
 }
 
-impl Scatter {
-    /// In words. `level`: mean square of the noise over the declared one.
-    pub(super) fn detail(&self, level: f64, slides: bool) -> String {
-        let sigma = self.sigma * libm::sqrt(level);
-        let (size, unit) = if slides { (sigma * 1e6, "µm") } else { (sigma.to_degrees() * 3600.0, "arcsec") };
-        format!("joint {} does not repeat: its errors scatter by {size:.0} {unit}, in no order that was recorded", self.joint + 1)
-    }
-}
-
 /// Whether both are the same joints, their sigmas the same within a step.
 pub(super) fn alike(one: &[Scatter], other: &[Scatter]) -> bool {
     let near = |a: &Scatter, b: &Scatter| a.joint == b.joint && (0.7..1.5).contains(&(a.sigma / b.sigma));

@@ -11,6 +11,7 @@ use crate::effects::Kind;
 use crate::effects::signature::posture::Mechanism;
 use crate::measurement::{Measurement, Sensor};
 use crate::recording::schema::{check, json_schema};
+use crate::report::wording;
 use crate::scene;
 use crate::seed::{Stream, stream};
 
@@ -95,7 +96,7 @@ fn readings(label: &str, off: impl Fn(&Arm, &[f64], &[i8], usize, f64) -> f64) -
 
 fn diagnosed(arm: &Arm, rows: &[Measurement], without: Vec<Kind>) -> Diagnosis {
     let rows: Vec<&Measurement> = rows.iter().collect();
-    diagnose(arm, &sensor(), &rows, &Options { without, ..Options::new(NoiseSource::Declared) }).unwrap()
+    wording::diagnosis(diagnose(arm, &sensor(), &rows, &Options { without, ..Options::new(NoiseSource::Declared) }).unwrap())
 }
 
 #[test]
@@ -179,7 +180,7 @@ fn orientations_that_are_better_than_said_are_no_effect() {
     let sensor = Sensor { orientation_sigma_rad: Some(4.5 * ORIENTATION_SIGMA), ..sensor() };
     let rows: Vec<&Measurement> = rows.iter().collect();
     let options = Options { without: Vec::new(), ..Options::new(NoiseSource::Declared) };
-    let found = diagnose(&arm, &sensor, &rows, &options).unwrap();
+    let found = wording::diagnosis(diagnose(&arm, &sensor, &rows, &options).unwrap());
     assert!(found.effects.is_empty() && !found.unknown.present, "{}", found.sentence);
     let sigma = found.noise_floor.rotation_rad.unwrap();
     assert!((sigma / ORIENTATION_SIGMA - 1.0).abs() < 0.25, "{sigma}");

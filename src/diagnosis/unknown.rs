@@ -1,11 +1,11 @@
 //! Whether something is left that no effect of the library explains.
 
 use super::Analysis;
-use super::outcome::{NoiseFloor, NoiseSource, Unknown};
-use super::sentence::whose;
+use super::conclusion::{Remainder, Remains};
+use super::outcome::{NoiseFloor, NoiseSource};
 
 /// What is unknown: shapes without a name, structure, or too much. `level`: mean square of the residual over the declared one.
-pub(super) fn unknown(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFloor) -> Unknown {
+pub(super) fn unknown(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFloor) -> Remainder {
     let of_nameless = analysis
         .found
         .claims
@@ -22,25 +22,28 @@ pub(super) fn unknown(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFl
     let excess = known && level > decision.excess * over * over;
     let scatters = !analysis.scatter.is_empty();
     let present = of_nameless >= decision.named || structured || excess || scatters;
-    let r#where = present.then(|| {
+    let mut remains: Vec<Remains> = Vec::new();
+    if present {
         let members = analysis.found.best.iter().map(|(hypothesis, _)| &analysis.evidence.candidates.hypotheses[*hypothesis]);
         let mut unnamed: Vec<_> = members.zip(&analysis.moved.rms_m).filter(|(of, _)| of.kind.is_none()).collect();
         unnamed.sort_by(|a, b| b.1.total_cmp(a.1));
         let largest = unnamed.iter().take(decision.unknown_said);
-        let mut said: Vec<String> = largest.map(|(of, rms_m)| format!("{} ({:.0} µm)", of.detail, *rms_m * 1e6)).collect();
+        remains.extend(largest.map(|(of, rms_m)| Remains::Shape { detail: of.detail.clone(), rms_m: *rms_m }));
         if unnamed.len() > decision.unknown_said {
-            let more = unnamed.len() - decision.unknown_said;
-            said.push(format!("{more} smaller one{}", if more == 1 { "" } else { "s" }));
+            remains.push(Remains::Smaller { count: unnamed.len() - decision.unknown_said });
         }
-        said.extend(analysis.scatter.iter().map(|one| one.detail(level, analysis.linear.rows.mechanism.slides[one.joint])));
+        remains.extend(analysis.scatter.iter().map(|one| Remains::Scatter {
+            joint: one.joint + 1,
+            sigma: one.sigma * libm::sqrt(level),
+            slides: analysis.linear.rows.mechanism.slides[one.joint],
+        }));
         if structured {
-            said.push(analysis.structure.r#where.clone());
+            remains.push(Remains::Trend(analysis.structure.strongest));
         }
-        if said.is_empty() {
-            said.push(format!("what remains is {:.1} times the {} noise", libm::sqrt(level), whose(noise_floor.source)));
+        if remains.is_empty() {
+            remains.push(Remains::Noise { ratio: libm::sqrt(level), source: noise_floor.source });
         }
-        said.join("; ")
-    });
+    }
     let of_scatter = analysis.scatter.iter().map(|one| 1.0 / (1.0 + libm::exp(one.log_odds))).fold(1.0, f64::min);
-    Unknown { present, p_value: p_value.min(1.0 - of_nameless).min(of_scatter).max(0.0), r#where }
+    Remainder { present, p_value: p_value.min(1.0 - of_nameless).min(of_scatter).max(0.0), remains }
 }
