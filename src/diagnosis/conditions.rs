@@ -136,7 +136,7 @@ pub(crate) fn conditions(
     };
     let is_upright = |joint: usize| readings.iter().all(|reading| unknown(reading, joint));
     let upright = upright.map_or_else(|| (0..count).map(is_upright).collect(), <[bool]>::to_vec);
-    let margin = (total / 10).max(3);
+    let margin = ((settings.change_margin * total as f64) as usize).max(settings.change_margin_readings);
     let span = total.saturating_sub(2 * margin);
     let stride = span.div_ceil(settings.change_points.max(1)).max(1);
     let changes = (margin..total.saturating_sub(margin)).step_by(stride).collect();

@@ -47,7 +47,7 @@ pub(super) fn detectability(analysis: &Analysis<'_>, noise: f64) -> Detectabilit
         let place = Place { time_s: None, ..place(analysis, variants[0]) };
         let largest = hypothesis.range[1];
         all += 1.0;
-        let value = power.least.filter(|least| least.is_finite() && *least < 1e4 * largest);
+        let value = power.least.filter(|least| least.is_finite() && *least < analysis.options.settings.power.beyond * largest);
         let minimum_detectable = MinimumDetectable { value, unit: kind.unit().to_owned() };
         let reason = match value {
             Some(value) if value <= largest => {

@@ -313,7 +313,8 @@ impl<'a> Evidence<'a> {
                 let factor = cholesky.l_dirty();
                 let log_determinant =
                     (0..width).map(|i| 2.0 * libm::log(factor[(i, i)])).sum::<f64>() - width as f64 * libm::log(precision);
-                put(scale, right.dot(&coefficients), log_determinant, coefficients[0], 0.0);
+                let variance = if signed { cholesky.inverse()[(0, 0)] } else { 0.0 };
+                put(scale, right.dot(&coefficients), log_determinant, coefficients[0], variance);
             }
         }
         found
@@ -330,5 +331,57 @@ pub(super) fn log_allowed(z: f64) -> f64 {
         -0.5 * z * z - libm::log(-z) - 0.919 + 0.693
     } else {
         libm::log(libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::products::test_marginal;
+    use crate::effects::{Kind, Level, Location};
+    use crate::seed::stream;
+
+    /// The normal distribution's table, and its tail's first term far out.
+    #[test]
+    fn the_share_that_physics_allows_is_that_of_the_normal_distribution() {
+        for (z, share) in [(0.0, 0.5), (1.0, 0.841_345), (-1.0, 0.158_655), (-3.0, 0.001_349_898), (6.5, 1.0)] {
+            let found = 0.5 * log_allowed(z).exp();
+            assert!((found / share - 1.0).abs() < 1e-5, "{z}: {found}");
+        }
+        assert!((log_allowed(-6.0 - 1e-9) - log_allowed(-6.0 + 1e-9)).abs() < 0.03);
+    }
+
+    /// No kind of the table is one-signed with several coefficients; one that were would be held to the sign of the first.
+    #[test]
+    fn one_sign_holds_for_the_first_of_several_coefficients_too() {
+        let of = Hypothesis {
+            share: None,
+            kind: Some(Kind::JointCompliance),
+            location: Location { level: Level::Joint, index: Some(1) },
+            shape: Shape::Torque { joint: 0 },
+            range: [0.5, 2.0],
+            spread: vec![1.0; 2],
+            detail: String::new(),
+        };
+        let candidates =
+            Candidates { hypotheses: vec![of], first: vec![0], unit: vec![1.0], log_odds: vec![-1.0], active: vec![true] };
+        let (noise, settings) = (NoisePrior { degrees_of_freedom: 10.0, level: 1.0 }, Settings::default());
+        let mut draws = stream(4, "test/one-signed");
+        let signatures = DMatrix::from_fn(80, 2, |_, _| draws.normal());
+        let errors = DVector::from_fn(80, |_, _| draws.normal());
+        let value = |sign: f64| {
+            let residual = &errors + signatures.column(0) * sign;
+            let products = test_marginal(&candidates, &signatures, &residual);
+            let marginal = products.marginal();
+            let evidence = Evidence { marginal: &marginal, candidates: &candidates, noise, settings: &settings };
+            let found = evidence.extensions(&[]);
+            assert_eq!(found.len(), SCALES);
+            for one in &found {
+                let whole = evidence.log_posterior(&[one.member]);
+                assert!((one.log_posterior - whole).abs() < 1e-9 * whole.abs().max(1.0), "{one:?} against {whole}");
+            }
+            found[0].log_posterior
+        };
+        assert!(value(1.0) > value(-1.0) + 10.0);
     }
 }

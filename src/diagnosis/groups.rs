@@ -1,5 +1,6 @@
 //! Readings that are not independent: several targets of one pose, repeats without a move, and the same configuration read again.
-//! What geometry and effects leave there is the arm's, once, and the sensor's, each time.
+//! What geometry and effects leave there is the arm's, once, and the sensor's, each time: such readings tell the sensor's noise, and count
+//! for less than as many that are independent.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -227,7 +228,7 @@ pub fn weights(groups: &Groups, residual: &[f64], equations: &Equations, good: &
         return (vec![1.0; groups.of.len()], 0.0);
     }
     let correlation = if degrees_of_freedom < settings.pairs || all <= 0.0 {
-        0.5
+        settings.few_pairs_correlation
     } else {
         (1.0 - (within / of_within) / (all / of_all)).clamp(0.0, 1.0)
     };

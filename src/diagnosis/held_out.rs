@@ -104,9 +104,15 @@ pub enum Block {
 /// The ways of leaving out that `measurements` allow: by region first, then by payload and by session where there are several. Rows of
 /// a configuration stay together in a region.
 #[must_use]
-pub fn schemes(measurements: &[&Measurement], targets: &[Vector3<f64>], groups: &Groups, folds: usize) -> Vec<Scheme> {
+pub fn schemes(
+    measurements: &[&Measurement],
+    targets: &[Vector3<f64>],
+    groups: &Groups,
+    settings: &settings::Validation,
+) -> Vec<Scheme> {
+    let folds = settings.folds;
     let points: Vec<Vector3<f64>> = groups.rows.iter().map(|rows| targets[rows[0]]).collect();
-    let most = folds.min(points.len() / 4).max(2);
+    let most = folds.min(points.len() / settings.configurations).max(2);
     let of_group = regions(&points, most);
     let by_region = groups.of.iter().map(|group| of_group[*group]).collect();
     let mut schemes = vec![Scheme::new(Block::Region, by_region, &[], folds)];
@@ -125,7 +131,7 @@ pub fn schemes(measurements: &[&Measurement], targets: &[Vector3<f64>], groups: 
     let sessions: Vec<String> = sessions.iter().map(|name| (*name).to_owned()).collect();
     for (by, fold, names) in [(Block::Payload, at_payload, payloads), (Block::Session, at_session, sessions)] {
         let scheme = Scheme::new(by, fold, &names, folds);
-        if (0..scheme.folds).any(|out| scheme.leaves_enough(out)) && scheme.folds > 1 {
+        if (0..scheme.folds).any(|out| scheme.leaves_enough(out, settings.left)) && scheme.folds > 1 {
             schemes.push(scheme);
         }
     }
@@ -133,9 +139,9 @@ pub fn schemes(measurements: &[&Measurement], targets: &[Vector3<f64>], groups: 
 }
 
 impl Scheme {
-    /// Whether a quarter of the rows is left without fold `out`: less would hardly tell where the arm stands.
-    fn leaves_enough(&self, out: usize) -> bool {
-        4 * self.fold.iter().filter(|fold| **fold != out).count() >= self.fold.len()
+    /// Whether the share `least` of the rows is left without fold `out`.
+    fn leaves_enough(&self, out: usize, least: f64) -> bool {
+        self.fold.iter().filter(|fold| **fold != out).count() as f64 >= least * self.fold.len() as f64
     }
 
     /// `names`: of what each fold holds; those beyond the number of folds share one.
@@ -153,6 +159,9 @@ impl Scheme {
     }
 }
 
+/// Rounds of k-means: hundreds of points settle in fewer.
+const ROUNDS: usize = 30;
+
 /// Folds blocked by region: k-means of `points` from those farthest from each other.
 #[must_use]
 pub fn regions(points: &[Vector3<f64>], folds: usize) -> Vec<usize> {
@@ -169,7 +178,7 @@ pub fn regions(points: &[Vector3<f64>], folds: usize) -> Vec<usize> {
         }
     }
     let mut fold = vec![0; points.len()];
-    for _ in 0..30 {
+    for _ in 0..ROUNDS {
         for (point, fold) in points.iter().zip(&mut fold) {
             let distance = |at: &usize| (point - centres[*at]).norm_squared();
             *fold = (0..centres.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0);
@@ -206,7 +215,7 @@ impl Validation<'_> {
         use rayon::prelude::*;
         let mut folds: Vec<Fold> = (0..scheme.folds)
             .into_par_iter()
-            .filter(|number| scheme.leaves_enough(*number))
+            .filter(|number| scheme.leaves_enough(*number, self.settings.validation.left))
             .filter_map(|number| {
                 let rows: Vec<usize> =
                     (0..self.good.len()).filter(|row| scheme.fold[*row] == number && self.good[*row]).collect();

@@ -122,3 +122,59 @@ impl<'a> Linear<'a> {
         values.rows_range(self.rows.equations.of(row))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::products::Marginal;
+    use crate::diagnosis::tests::{hypothesis, with_analysis};
+    use crate::effects::Kind;
+
+    #[test]
+    fn what_effects_do_adds_up_and_is_that_of_their_signatures() {
+        with_analysis(
+            |_, _, _, _, _| 0.0,
+            |analysis| {
+                let (linear, candidates) = (analysis.linear, analysis.evidence.candidates);
+                let number = hypothesis(&analysis, Some(Kind::Backlash), 3);
+                let [a, b] = [candidates.first[number], candidates.first[hypothesis(&analysis, Some(Kind::JointCompliance), 4)]];
+                let together = linear.made(&[(a, 0.3), (b, -1.2)]);
+                let apart = linear.made(&[(a, 0.3)]) + linear.made(&[(b, -1.2)]);
+                assert!((&together - &apart).norm() < 1e-12 * together.norm());
+                // A coefficient of one is one unit of the kind: half a width at the joint, over the lever of the target.
+                let made = linear.made(&[(a, 1.0)]);
+                for (row, reading) in linear.readings.iter().enumerate() {
+                    let axis = reading.posture.axes[2];
+                    let lever = axis.cross(&(reading.target - reading.posture.origins[2])).norm();
+                    let expected = 0.5 * candidates.unit[number] * lever;
+                    assert!((linear.of_row(&made, row).norm() / expected - 1.0).abs() < 1e-9);
+                }
+                // What is left of all rows is what the squares count.
+                let geometry = DVector::from_element(linear.rows.jacobian.ncols(), 0.01);
+                let rows: Vec<usize> = (0..linear.count()).collect();
+                let left = linear.left(&geometry, &together);
+                assert!((linear.squares(&rows, &geometry, &together) / left.norm_squared() - 1.0).abs() < 1e-9);
+                assert!((linear.in_sigmas(&left).norm() * crate::diagnosis::tests::SIGMA / left.norm() - 1.0).abs() < 1e-9);
+            },
+        );
+    }
+
+    /// As many rows as there are stand for themselves; half of them, counted twice, tell about as much.
+    #[test]
+    fn rows_that_stand_for_all_tell_as_much() {
+        with_analysis(
+            |_, _, _, _, _| 0.0,
+            |analysis| {
+                let linear = analysis.linear;
+                let number = hypothesis(&analysis, Some(Kind::Backlash), 3);
+                let information = |most: usize| {
+                    let products = linear.thinned(most);
+                    Marginal::new(&products, None, &linear.prior).unwrap().information(number)
+                };
+                let whole = analysis.evidence.marginal.information(number);
+                assert!((information(linear.count()) / whole - 1.0).abs() < 1e-9);
+                assert!((0.3..1.7).contains(&(information(linear.count() / 2) / whole)));
+            },
+        );
+    }
+}

@@ -262,7 +262,7 @@ impl Pass {
         let (conditions, displaced) =
             conditions::conditions(measurements, &rows, &state.present, state.loads, state.upright.as_deref(), &settings.model);
         let mut candidates = candidates(data.options.hypotheses(&rows, &conditions, &state.ripples));
-        let scheme = held_out::schemes(measurements, &rows.targets, &data.groups, settings.validation.folds).swap_remove(0);
+        let scheme = held_out::schemes(measurements, &rows.targets, &data.groups, &settings.validation).swap_remove(0);
         // The effects found so far are taken out as large as they are on the arm as it is fitted now, and put back along their signatures.
         let mut total = rows.residual.clone();
         for (row, now) in displaced.iter().enumerate() {
@@ -407,7 +407,7 @@ pub fn diagnose(
     let outliers = outliers_of(&data, &pass, &found);
     let good: Vec<bool> = (0..measurements.len()).map(|row| !outliers.rows.contains(&row)).collect();
     let validation = Validation { linear: &linear, noise: data.noise, good: &good, best: &found.best, settings };
-    let held_out: Vec<HeldOut> = held_out::schemes(measurements, &pass.rows.targets, &data.groups, settings.validation.folds)
+    let held_out: Vec<HeldOut> = held_out::schemes(measurements, &pass.rows.targets, &data.groups, &settings.validation)
         .iter()
         .map(|scheme| match scheme.by {
             Block::Region => validation.run(scheme, &pass.products),
@@ -459,7 +459,7 @@ fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
     let mut plain: Option<(f64, State)> = None;
     for number in 0.. {
         let mut pass = Pass::new(data, &state, number)?;
-        if number < settings.model.choosing + 2 && pass.loads_matter_m > settings.model.loads_matter * sigma_m {
+        if number < settings.model.loads_passes && pass.loads_matter_m > settings.model.loads_matter * sigma_m {
             let other = State { loads: state.loads.other(), ..state.clone() };
             let otherwise = Pass::new(data, &other, number)?;
             if otherwise.log_likelihood > pass.log_likelihood {
@@ -506,7 +506,7 @@ fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
             let validation = Validation { linear: &linear, noise: data.noise, good: &good, best: &[], settings };
             validation.run(&pass.scheme, &pass.products).explained()
         };
-        if let Some(scatter) = looked.filter(|scatter| !scatter::alike(scatter, &state.scatter)) {
+        if let Some(scatter) = looked.filter(|scatter| !scatter::alike(scatter, &state.scatter, &settings.scatter)) {
             if state.scatter.is_empty() && plain.is_none() {
                 plain = Some((held_out(true), state.clone()));
             }
@@ -541,7 +541,7 @@ fn outliers_of(data: &Data<'_>, pass: &Pass, found: &Found) -> outliers::Outlier
     };
     let (sure, sure_counts): (Vec<f64>, Vec<usize>) =
         (0..squares.len()).filter(seated).map(|row| (squares[row], counts[row])).unzip();
-    if sure.len() < squares.len() && 2 * sure.len() >= data.measurements.len() {
+    if sure.len() < squares.len() && sure.len() as f64 >= settings.decided * data.measurements.len() as f64 {
         let far_off = std::mem::take(&mut outliers.rows);
         outliers = outliers::Outliers { rows: far_off, ..outliers::look(&sure, &sure_counts, settings) };
     }

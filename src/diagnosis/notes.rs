@@ -89,8 +89,9 @@ fn rounding(analysis: &Analysis<'_>) -> Vec<Note> {
     }
     let before_m = rms_m(analysis, |row| row.before_m);
     // Where less is left, the arm stood where the rounded readings say.
+    let decision = &analysis.options.settings.decision;
     let shows =
-        |square: f64| square.sqrt() > analysis.options.settings.decision.rounded * sensor_m && square.sqrt() < 1.5 * before_m;
+        |square: f64| square.sqrt() > decision.rounded * sensor_m && square.sqrt() < decision.rounded_over_left * before_m;
     found
         .into_iter()
         .filter(|(_, _, square)| shows(*square))

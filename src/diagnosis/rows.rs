@@ -164,14 +164,14 @@ pub fn fit(arm: &Arm, readings: Readings<'_>, settings: &Model) -> Result<Rows, 
     let squares: f64 = (0..equations.readings()).map(of_position).sum();
     let rms = libm::sqrt(squares / measurements.len() as f64);
     if rms.is_nan() || rms >= settings.astray * reach.max(settings.small_arm_m) {
-        return Err(DiagnosisError::NotThisRobot { rms_mm: rms * 1e3, hint: mistake::hint(arm, measurements) });
+        return Err(DiagnosisError::NotThisRobot { rms_mm: rms * 1e3, hint: mistake::hint(arm, measurements, settings.mended) });
     }
     if fitted.parameters().amax() > settings.implausible {
         let [shift, turn] = fitted.largest_errors();
         return Err(DiagnosisError::NotThisGeometry {
             shift_mm: shift * 1e3,
             turn_deg: turn.to_degrees(),
-            hint: mistake::hint(arm, measurements),
+            hint: mistake::hint(arm, measurements, settings.mended),
         });
     }
     let mechanism = mechanism.with_chain(fitted.root_to_tool());

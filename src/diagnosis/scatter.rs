@@ -1,7 +1,8 @@
 //! Joints that do not repeat: what remains lies along one joint's motion, larger than the sensor's noise and without order in anything
 //! that was recorded. Backlash does that where nobody recorded from which side the joint came. A variance of its own for that joint
-//! is compared with none, by marginal likelihood, and with the ripples and bumps that such scatter is mistaken for: among thousands of
-//! shapes one follows any scatter somewhat.
+//! is compared, by marginal likelihood, with none, with the ripples and bumps that such scatter is mistaken for (among thousands of
+//! shapes one follows any scatter somewhat), and with a sensor whose noise has another size along every axis; and most of what remains,
+//! large or small, must point along the joint's motion.
 
 use nalgebra::{DMatrix, DVector, DVectorView};
 
@@ -29,9 +30,10 @@ pub struct Scatter {
     pub log_odds: f64,
 }
 
-/// Whether both are the same joints, their sigmas the same within a step.
-pub(super) fn alike(one: &[Scatter], other: &[Scatter]) -> bool {
-    let near = |a: &Scatter, b: &Scatter| a.joint == b.joint && (0.7..1.5).contains(&(a.sigma / b.sigma));
+/// Whether both are the same joints, their sigmas alike.
+pub(super) fn alike(one: &[Scatter], other: &[Scatter], settings: &settings::Scatter) -> bool {
+    let [least, most] = settings.alike;
+    let near = |a: &Scatter, b: &Scatter| a.joint == b.joint && (least..most).contains(&(a.sigma / b.sigma));
     one.len() == other.len() && one.iter().all(|a| other.iter().any(|b| near(a, b)))
 }
 
@@ -149,8 +151,8 @@ impl<'a> Left<'a> {
     }
 
     /// Logarithm of the marginal likelihood of the residual with a scatter of `joint` besides `others` over that without, the noise's
-    /// level integrated out, the geometry as fitted, and the sigma averaged over; and the best sigma. `freedom`: equations that the
-    /// model leaves. A row counts by its weight.
+    /// level integrated out, the geometry as fitted, and the sigma averaged over; and the best sigma. `degrees_of_freedom`: equations that
+    /// the model leaves. A row counts by its weight.
     fn value(
         &self,
         degrees_of_freedom: f64,

@@ -10,6 +10,11 @@ use super::evidence::{Evidence, Extension};
 use crate::effects::{Kind, Location};
 use crate::seed::stream;
 
+/// Difference of log posteriors that is a step up: less is rounding, by which a climb would go round in circles.
+const BETTER: f64 = 1e-6;
+/// Weight, of all that may be drawn, below which nothing is: thousands of such hypotheses together change no probability that is said.
+const NEGLIGIBLE: f64 = 1e-9;
+
 /// What is claimed: a kind (or none) at a place.
 pub type Claim = (Option<Kind>, Location);
 
@@ -57,7 +62,7 @@ pub fn climb(evidence: &Evidence<'_>, start: &[(usize, usize)], most: usize) -> 
     loop {
         while members.len() < most {
             match best_addition(evidence, &members) {
-                Some((member, better)) if better > value + 1e-6 => {
+                Some((member, better)) if better > value + BETTER => {
                     members.push(member);
                     value = better;
                 }
@@ -75,7 +80,7 @@ pub fn climb(evidence: &Evidence<'_>, start: &[(usize, usize)], most: usize) -> 
             with.into_iter().chain([without]).max_by(|a, b| a.0.total_cmp(&b.0))
         });
         match exchanges.max_by(|a, b| a.0.total_cmp(&b.0)) {
-            Some((better, other)) if better > value + 1e-6 => (value, members) = (better, other),
+            Some((better, other)) if better > value + BETTER => (value, members) = (better, other),
             _ => return (members, value),
         }
     }
@@ -134,7 +139,7 @@ fn walk(evidence: &Evidence<'_>, best: &[(usize, usize)], most: usize) -> Found 
             let mut next = None;
             for extension in &extensions {
                 let weight = weight(extension);
-                if weight < 1e-9 * total {
+                if weight < NEGLIGIBLE * total {
                     continue;
                 }
                 add(&mut here, claim(evidence, extension.member.0), weight / total, extension.member.0);
@@ -182,7 +187,7 @@ fn walk(evidence: &Evidence<'_>, best: &[(usize, usize)], most: usize) -> Found 
             continue;
         }
         let own = best.get(place).copied().filter(|(member, _)| claim(evidence, *member) == likeliest.claim);
-        members.push(own.unwrap_or((likeliest.hypothesis, 1)));
+        members.push(own.unwrap_or((likeliest.hypothesis, evidence.settings.search.stand_in_scale)));
         causes.push(beliefs);
     }
     let order = in_order(evidence, &members);

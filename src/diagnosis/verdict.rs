@@ -63,8 +63,10 @@ fn noise_floor(analysis: &Analysis<'_>) -> NoiseFloor {
 
 /// `unknown`: whether something is left. `share`: of the kinds and places that would have shown.
 fn decide(unknown: bool, effects: &[Effect], sets: &[Vec<Candidate>], share: f64, settings: &Decision) -> Verdict {
-    // Sure, and the same for half of the folds at least.
-    let settled = |effect: &&Effect| effect.probability >= settings.sure && 2 * effect.folds[0] >= effect.folds[1];
+    // Sure, and the same for enough folds.
+    let settled = |effect: &&Effect| {
+        effect.probability >= settings.sure && effect.folds[0] as f64 >= settings.folds * effect.folds[1] as f64
+    };
     let named: Vec<&Effect> = effects.iter().filter(|effect| effect.kind != Kind::MeasurementOutliers).collect();
     let open = sets.iter().any(|set| set.iter().map(|candidate| candidate.probability).sum::<f64>() >= settings.named);
     if unknown {

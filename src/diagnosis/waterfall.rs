@@ -55,7 +55,7 @@ impl<'a> Waterfall<'a> {
         let rows =
             rows::fit(arm, Readings { sensor, measurements, weights: &start, displacement: &[], scatter: &[] }, &settings.model)?;
         let (conditions, _) = conditions::conditions(measurements, &rows, &[], Loads::AsItStands, None, &settings.model);
-        let scheme = held_out::schemes(measurements, &rows.targets, &groups, settings.validation.folds).swap_remove(0);
+        let scheme = held_out::schemes(measurements, &rows.targets, &groups, &settings.validation).swap_remove(0);
         let good = vec![true; total];
         let mut waterfall = Waterfall { arm, sensor, measurements, rows, conditions, scheme, weights: start, good, settings };
         for _ in 0..PASSES {
@@ -135,5 +135,41 @@ impl<'a> Waterfall<'a> {
             .collect::<Result<_, DiagnosisError>>()?;
         let (sum, count) = squares.iter().fold((0.0, 0), |(sum, count), one| (sum + one.0, count + one.1));
         Ok(libm::sqrt(sum / count.max(1) as f64))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::tests::{SIGMA, diagnosed, readings, sensor};
+
+    /// The waterfall from geometry to the noise, with readings of which only the play is wrong.
+    #[test]
+    fn the_true_cause_takes_held_out_errors_down_to_the_noise() {
+        let width = 4e-4;
+        let (arm, rows) = readings(
+            "test/waterfall",
+            |_, _, approach, joint, _| {
+                if joint == 2 { 0.5 * width * f64::from(approach[2]) } else { 0.0 }
+            },
+        );
+        let found = diagnosed(&arm, &rows, Vec::new());
+        let (rows, sensor, settings): (Vec<&Measurement>, _, _) = (rows.iter().collect(), sensor(), Settings::default());
+        let waterfall = Waterfall::new(&arm, &sensor, &rows, &found.effects, &settings).unwrap();
+        let nothing = waterfall.after(&vec![[0.0; 6]; rows.len()]).unwrap();
+        let all = waterfall.after(&waterfall.together(&found.effects)).unwrap();
+        let noise = 3_f64.sqrt() * SIGMA;
+        // Sixty readings do not tell geometry quite.
+        assert!((noise..2.0 * noise).contains(&all) && nothing > 2.0 * all, "{nothing} {all}");
+        // One effect and nothing else: its columns are what all do together, to second order.
+        let alone = waterfall.displacements(&found.effects[0]).unwrap();
+        let size = |of: &Displacement| of[0].hypot(of[1]).hypot(of[2]);
+        for (one, together) in alone.iter().zip(waterfall.together(&found.effects)) {
+            assert!((size(one) - size(&together)).abs() < 1e-6, "{one:?} {together:?}");
+        }
+        // Where the readings lack what an effect follows, nothing is said.
+        let mut blind = waterfall.clone();
+        blind.conditions.readings.iter_mut().for_each(|reading| reading.approach.clear());
+        assert_eq!(blind.displacements(&found.effects[0]), None);
     }
 }
