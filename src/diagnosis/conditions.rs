@@ -13,15 +13,15 @@ use crate::measurement::Measurement;
 
 /// Rows as signatures see them, and what the data have.
 #[derive(Clone, Debug)]
-pub struct Conditions {
+pub(crate) struct Conditions {
     /// Of each row.
-    pub readings: Vec<Reading>,
+    pub(crate) readings: Vec<Reading>,
     /// What there is.
-    pub columns: Columns,
+    pub(crate) columns: Columns,
     /// What is missing.
-    pub notes: Vec<Note>,
+    pub(crate) notes: Vec<Note>,
     /// Time of each place in time, s.
-    pub times: Vec<f64>,
+    pub(crate) times: Vec<f64>,
 }
 
 /// The conditions of `measurements`, whose geometry is `rows`, with the effects `present`, which answer to `loads`. `upright`: the joints
@@ -187,6 +187,6 @@ fn remember(measurements: &[&Measurement], in_time: &[usize], readings: &mut [Re
 
 /// Mean of vectors; zero where there are none.
 #[must_use]
-pub fn centre(points: &[Vector3<f64>]) -> Vector3<f64> {
+pub(crate) fn centre(points: &[Vector3<f64>]) -> Vector3<f64> {
     points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64
 }

@@ -13,26 +13,26 @@ use crate::effects::signature::shape::Shape;
 
 /// What is known of the noise beforehand: so many readings' worth (degrees of freedom) of a mean square, in declared sigmas.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NoisePrior {
+pub(crate) struct NoisePrior {
     /// Degrees of freedom.
-    pub degrees_of_freedom: f64,
+    pub(crate) degrees_of_freedom: f64,
     /// Mean square over the declared one.
-    pub level: f64,
+    pub(crate) level: f64,
 }
 
 /// The hypotheses in play, and where their columns are.
 #[derive(Clone, Debug)]
-pub struct Candidates {
+pub(crate) struct Candidates {
     /// What they are.
-    pub hypotheses: Vec<Hypothesis>,
+    pub(crate) hypotheses: Vec<Hypothesis>,
     /// First column of each.
-    pub first: Vec<usize>,
+    pub(crate) first: Vec<usize>,
     /// Magnitude that a coefficient of one stands for.
-    pub unit: Vec<f64>,
+    pub(crate) unit: Vec<f64>,
     /// Logarithm of the prior odds of having it over not.
-    pub log_odds: Vec<f64>,
+    pub(crate) log_odds: Vec<f64>,
     /// Whether it is in play.
-    pub active: Vec<bool>,
+    pub(crate) active: Vec<bool>,
 }
 
 /// Logarithm of how much likelier a set of `count` effects is beforehand than their own odds say: any number of effects is as likely as
@@ -41,40 +41,29 @@ fn log_multiplicity(count: usize) -> f64 {
     (1..=count).map(|number| libm::log(number as f64)).sum()
 }
 
-/// A set of effects, each with the scale of its prior.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Model {
-    /// Hypothesis and scale, in the order added.
-    pub members: Vec<(usize, usize)>,
-    /// Logarithm of posterior over that of the empty set.
-    pub log_posterior: f64,
-}
-
 /// The coefficients of a model.
 #[derive(Clone, Debug)]
-pub struct Fit {
+pub(crate) struct Fit {
     /// Columns.
-    pub columns: Vec<usize>,
+    pub(crate) columns: Vec<usize>,
     /// Posterior means.
-    pub coefficients: DVector<f64>,
+    pub(crate) coefficients: DVector<f64>,
     /// Posterior covariance over the noise's mean square.
-    pub covariance: DMatrix<f64>,
-    /// By how much the residual's square drops.
-    pub drop: f64,
+    pub(crate) covariance: DMatrix<f64>,
     /// Posterior mean of the noise's mean square, in declared sigmas.
-    pub noise: f64,
+    pub(crate) noise: f64,
 }
 
 impl Candidates {
     /// Columns of a hypothesis.
     #[must_use]
-    pub fn columns(&self, hypothesis: usize) -> std::ops::Range<usize> {
+    pub(crate) fn columns(&self, hypothesis: usize) -> std::ops::Range<usize> {
         self.first[hypothesis]..self.first[hypothesis] + self.hypotheses[hypothesis].spread.len()
     }
 
     /// Whether both cannot be in one model: they are the same thing.
     #[must_use]
-    pub fn exclude(&self, a: usize, b: usize) -> bool {
+    pub(crate) fn exclude(&self, a: usize, b: usize) -> bool {
         if a == b {
             return true;
         }
@@ -103,7 +92,7 @@ fn overlap(a: &Hypothesis, b: &Hypothesis) -> bool {
 
 /// Whether physics allows only one sign.
 #[must_use]
-pub fn one_signed(hypothesis: &Hypothesis) -> bool {
+pub(crate) fn one_signed(hypothesis: &Hypothesis) -> bool {
     hypothesis.kind.is_some_and(|kind| kind.descriptor().one_signed)
 }
 
@@ -118,15 +107,15 @@ struct Solved {
 
 /// The evidence of sets of effects, given what survives of the geometry.
 #[derive(Clone, Copy)]
-pub struct Evidence<'a> {
+pub(crate) struct Evidence<'a> {
     /// What survives of the geometry.
-    pub marginal: &'a Marginal<'a>,
+    pub(crate) marginal: &'a Marginal<'a>,
     /// The hypotheses.
-    pub candidates: &'a Candidates,
+    pub(crate) candidates: &'a Candidates,
     /// What is known of the noise.
-    pub noise: NoisePrior,
+    pub(crate) noise: NoisePrior,
     /// What is likely beforehand, and how it is searched.
-    pub settings: &'a Settings,
+    pub(crate) settings: &'a Settings,
 }
 
 /// An effect more.
@@ -180,7 +169,7 @@ impl<'a> Evidence<'a> {
 
     /// Evidence and prior of `members` together, over those of no effect.
     #[must_use]
-    pub fn log_posterior(&self, members: &[(usize, usize)]) -> f64 {
+    pub(crate) fn log_posterior(&self, members: &[(usize, usize)]) -> f64 {
         if members.is_empty() {
             return 0.0;
         }
@@ -203,7 +192,7 @@ impl<'a> Evidence<'a> {
     /// Logarithm of the marginal likelihood of the readings with `members`, up to what does not depend on members and on the
     /// geometry's prior: for the comparison of such priors.
     #[must_use]
-    pub fn log_likelihood(&self, members: &[(usize, usize)]) -> f64 {
+    pub(crate) fn log_likelihood(&self, members: &[(usize, usize)]) -> f64 {
         let (drop, log_determinant) = self.solve(members).map_or((0.0, 0.0), |model| (model.drop, model.log_determinant));
         let degrees = self.noise.degrees_of_freedom + self.marginal.degrees_of_freedom;
         let left = self.noise.degrees_of_freedom * self.noise.level + self.marginal.residual - drop;
@@ -212,33 +201,32 @@ impl<'a> Evidence<'a> {
 
     /// Posterior mean of the noise's mean square beside `members`, in declared sigmas.
     #[must_use]
-    pub fn noise_level(&self, members: &[(usize, usize)]) -> f64 {
+    pub(crate) fn noise_level(&self, members: &[(usize, usize)]) -> f64 {
         self.level(self.solve(members).map_or(0.0, |model| model.drop))
     }
 
     /// The coefficients of `members`.
     #[must_use]
-    pub fn fit(&self, members: &[(usize, usize)]) -> Option<Fit> {
+    pub(crate) fn fit(&self, members: &[(usize, usize)]) -> Option<Fit> {
         let model = self.solve(members)?;
         Some(Fit {
             noise: self.level(model.drop),
             columns: model.columns,
             coefficients: model.coefficients,
             covariance: model.inverse,
-            drop: model.drop,
         })
     }
 
     /// Columns and coefficients of `members`.
     #[must_use]
-    pub fn coefficients(&self, members: &[(usize, usize)]) -> Vec<(usize, f64)> {
+    pub(crate) fn coefficients(&self, members: &[(usize, usize)]) -> Vec<(usize, f64)> {
         let fit = self.fit(members);
         fit.map_or_else(Vec::new, |fit| fit.columns.into_iter().zip(fit.coefficients.iter().copied()).collect())
     }
 
     /// All sets that have one effect more than `members`.
     #[must_use]
-    pub fn extensions(&self, members: &[(usize, usize)]) -> Vec<Extension> {
+    pub(crate) fn extensions(&self, members: &[(usize, usize)]) -> Vec<Extension> {
         let (marginal, candidates) = (self.marginal, self.candidates);
         let Some(base) = self.solve(members) else {
             return Vec::new();

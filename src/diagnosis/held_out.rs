@@ -19,31 +19,31 @@ use crate::measurement::Measurement;
 
 /// What one fold says.
 #[derive(Clone, Debug)]
-pub struct Fold {
+pub(crate) struct Fold {
     /// What it is called ([`Scheme::names`]).
-    pub name: String,
+    pub(crate) name: String,
     /// Rows.
-    pub rows: usize,
+    pub(crate) rows: usize,
     /// Sum of squares of the held-out positions, m²: base and target only.
-    pub nominal: f64,
+    pub(crate) nominal: f64,
     /// With all geometry.
-    pub geometry: f64,
+    pub(crate) geometry: f64,
     /// With all geometry and the first 1, 2, … effects of the best set of all readings, each as large as the other folds say.
-    pub with_best: Vec<f64>,
+    pub(crate) with_best: Vec<f64>,
     /// With all geometry and what was chosen without the fold, as much of it as is used.
-    pub explained: f64,
+    pub(crate) explained: f64,
     /// With the first 1, 2, … of what was chosen without the fold.
-    pub with_chosen: Vec<f64>,
+    pub(crate) with_chosen: Vec<f64>,
     /// What was chosen without the fold, in the order added.
-    pub chosen: Vec<usize>,
+    pub(crate) chosen: Vec<usize>,
     /// How many of these are used.
-    pub used: usize,
+    pub(crate) used: usize,
 }
 
 impl Fold {
     /// With the first `count` effects of the best set of all readings.
     #[must_use]
-    pub fn with(&self, count: usize) -> f64 {
+    pub(crate) fn with(&self, count: usize) -> f64 {
         match self.with_best.len().min(count) {
             0 => self.geometry,
             count => self.with_best[count - 1],
@@ -60,17 +60,17 @@ impl Fold {
 
 /// What leaving out in one way says.
 #[derive(Clone, Debug)]
-pub struct HeldOut {
+pub(crate) struct HeldOut {
     /// What the rows of a fold share.
-    pub by: Block,
+    pub(crate) by: Block,
     /// Fold by fold.
-    pub folds: Vec<Fold>,
+    pub(crate) folds: Vec<Fold>,
 }
 
 impl HeldOut {
     /// Mean square of the held-out positions with the effects that are used, m².
     #[must_use]
-    pub fn explained(&self) -> f64 {
+    pub(crate) fn explained(&self) -> f64 {
         let rows: usize = self.folds.iter().map(|fold| fold.rows).sum();
         self.folds.iter().map(|fold| fold.explained).sum::<f64>() / rows.max(1) as f64
     }
@@ -78,15 +78,15 @@ impl HeldOut {
 
 /// A way of leaving rows out.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Scheme {
+pub(crate) struct Scheme {
     /// What the rows of a fold share.
-    pub by: Block,
+    pub(crate) by: Block,
     /// Fold of each row.
-    pub fold: Vec<usize>,
+    pub(crate) fold: Vec<usize>,
     /// Number of folds.
-    pub folds: usize,
+    pub(crate) folds: usize,
     /// What each fold is called: the payload or the session; empty for regions.
-    pub names: Vec<String>,
+    pub(crate) names: Vec<String>,
 }
 
 /// What the rows of a fold share.
@@ -104,7 +104,7 @@ pub enum Block {
 /// The ways of leaving out that `measurements` allow: by region first, then by payload and by session where there are several. Rows of
 /// a configuration stay together in a region.
 #[must_use]
-pub fn schemes(
+pub(crate) fn schemes(
     measurements: &[&Measurement],
     targets: &[Vector3<f64>],
     groups: &Groups,
@@ -164,7 +164,7 @@ const ROUNDS: usize = 30;
 
 /// Folds blocked by region: k-means of `points` from those farthest from each other.
 #[must_use]
-pub fn regions(points: &[Vector3<f64>], folds: usize) -> Vec<usize> {
+pub(crate) fn regions(points: &[Vector3<f64>], folds: usize) -> Vec<usize> {
     let centre = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
     let far = |point: &Vector3<f64>, centres: &[Vector3<f64>]| {
         centres.iter().map(|centre| (point - centre).norm_squared()).fold(f64::INFINITY, f64::min)
@@ -195,23 +195,23 @@ pub fn regions(points: &[Vector3<f64>], folds: usize) -> Vec<usize> {
 }
 
 /// What is left out and chosen anew.
-pub struct Validation<'a> {
+pub(crate) struct Validation<'a> {
     /// The readings.
-    pub linear: &'a Linear<'a>,
+    pub(crate) linear: &'a Linear<'a>,
     /// What is known of the noise.
-    pub noise: NoisePrior,
+    pub(crate) noise: NoisePrior,
     /// Rows that are no outliers; only they are counted.
-    pub good: &'a [bool],
+    pub(crate) good: &'a [bool],
     /// The best set of all readings.
-    pub best: &'a [(usize, usize)],
+    pub(crate) best: &'a [(usize, usize)],
     /// How it is searched, and what counts.
-    pub settings: &'a Settings,
+    pub(crate) settings: &'a Settings,
 }
 
 impl Validation<'_> {
     /// Leaves out each fold of `scheme` in turn; `products` are by its folds.
     #[must_use]
-    pub fn run(&self, scheme: &Scheme, products: &Products) -> HeldOut {
+    pub(crate) fn run(&self, scheme: &Scheme, products: &Products) -> HeldOut {
         use rayon::prelude::*;
         let mut folds: Vec<Fold> = (0..scheme.folds)
             .into_par_iter()

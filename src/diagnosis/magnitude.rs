@@ -85,7 +85,6 @@ mod tests {
             columns: candidates.columns(hypothesis).collect(),
             coefficients: DVector::from_fn(values.len(), |at, _| values[at] / size(at)),
             covariance: DMatrix::from_diagonal(&variances),
-            drop: 0.0,
             noise: 1.0,
         }
     }

@@ -14,7 +14,7 @@ const DAMPING: f64 = 1e-9;
 
 /// A sentence about what to look at: the mistake that explains most of the misfit, if one leaves less of it than the share `mended`.
 #[must_use]
-pub fn hint(arm: &Arm, measurements: &[&Measurement], mended: f64) -> String {
+pub(crate) fn hint(arm: &Arm, measurements: &[&Measurement], mended: f64) -> String {
     let mechanism = Mechanism::new(arm);
     // What lacks a coordinate cannot be registered.
     let whole: Vec<&&Measurement> = measurements.iter().filter(|row| row.unread == [false; 3]).collect();

@@ -1,45 +1,49 @@
 //! From measurements to causes: what geometry leaves, which effects explain it with what probability, how far that goes on poses
 //! that were not used, what could not have been seen, and what remains unknown.
 //!
-//! Data ([`groups`], [`conditions`]) → a linear problem about the fitted geometry and the effects found so far ([`rows`], `linear`), made
-//! again until nothing changes → sets of effects with their probabilities, for which inner products suffice ([`products`], [`evidence`],
-//! [`search`]) → what they are worth on readings that were not used ([`held_out`]) → what that comes to ([`conclusion`]), which
+//! Data (`groups`, `conditions`) → a linear problem about the fitted geometry and the effects found so far (`rows`, `linear`), made
+//! again until nothing changes → sets of effects with their probabilities, for which inner products suffice (`products`, `evidence`,
+//! `search`) → what they are worth on readings that were not used (`held_out`) → what that comes to ([`conclusion`]), which
 //! [`crate::report::wording`] puts into words ([`outcome`]).
 
 mod advice;
 mod candidates;
 mod claims;
 pub mod conclusion;
-pub mod conditions;
+pub(crate) mod conditions;
 mod confusion;
 pub(crate) mod deflection;
 mod detectability;
-pub mod evidence;
+mod evidence;
 mod gap;
-pub mod groups;
-pub mod held_out;
+mod groups;
+pub(crate) mod held_out;
 mod linear;
 mod magnitude;
-pub mod mistake;
+mod mistake;
 mod naming;
 mod notes;
-pub mod open_set;
+mod open_set;
 pub mod outcome;
-pub mod outliers;
+mod outliers;
 pub(crate) mod parameters;
-pub mod power;
-pub mod products;
+mod power;
+mod products;
 mod ripple;
-pub mod rows;
-pub mod scatter;
-pub mod search;
+pub(crate) mod rows;
+mod scatter;
+mod search;
 pub mod settings;
 #[cfg(test)]
 pub(crate) mod tests;
 mod unknown;
 mod verdict;
-pub mod waterfall;
+pub(crate) mod waterfall;
 mod weights;
+
+pub use evidence::Extension;
+pub use held_out::Block;
+pub use rows::DiagnosisError;
 
 use nalgebra::DVector;
 
@@ -53,14 +57,14 @@ use candidates::{candidates, weigh};
 use conclusion::Conclusion;
 use conditions::Conditions;
 use deflection::{Loads, Present, present};
-use evidence::{Candidates, Evidence, Extension, NoisePrior};
+use evidence::{Candidates, Evidence, NoisePrior};
 use groups::{Groups, Repeats};
-use held_out::{Block, HeldOut, Scheme, Validation};
+use held_out::{HeldOut, Scheme, Validation};
 use linear::Linear;
 use outcome::NoiseSource;
 use products::{Marginal, Products};
 use ripple::Ripple;
-use rows::{DiagnosisError, Readings, Rows};
+use rows::{Readings, Rows};
 use scatter::Scatter;
 use search::{Found, climb};
 use settings::Settings;

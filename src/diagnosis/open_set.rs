@@ -11,13 +11,13 @@ use crate::seed::stream;
 
 /// What the tests say.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Structure {
+pub(crate) struct Structure {
     /// Of there being none, the best of all tests accounted for.
-    pub p_value: f64,
+    pub(crate) p_value: f64,
     /// The strongest.
-    pub strongest: Trend,
+    pub(crate) strongest: Trend,
     /// By how many standard deviations it stands out.
-    pub strength: f64,
+    pub(crate) strength: f64,
 }
 
 /// Neighbours in a variable, and what they say.
@@ -52,7 +52,12 @@ fn orders(conditions: &Conditions, rows: &[usize]) -> Vec<Order> {
 /// Tests `residual` (one vector per row, in sigmas times the root of the row's weight) for likeness of neighbours in every order. The
 /// rows of each of `units` count as one: readings of one configuration are alike without any structure between configurations.
 #[must_use]
-pub fn structure(conditions: &Conditions, residual: &[Vector3<f64>], units: &[Vec<usize>], permutations: usize) -> Structure {
+pub(crate) fn structure(
+    conditions: &Conditions,
+    residual: &[Vector3<f64>],
+    units: &[Vec<usize>],
+    permutations: usize,
+) -> Structure {
     let rows: Vec<usize> = units.iter().map(|unit| unit[0]).collect();
     let residual: Vec<Vector3<f64>> = units
         .iter()
@@ -124,7 +129,7 @@ pub fn structure(conditions: &Conditions, residual: &[Vector3<f64>], units: &[Ve
 
 /// The mean residual (m) along each joint's motion by its angle, as an angle of the joint.
 #[must_use]
-pub fn maps(conditions: &Conditions, residual_m: &[Vector3<f64>], bins: usize) -> Vec<Map> {
+pub(crate) fn maps(conditions: &Conditions, residual_m: &[Vector3<f64>], bins: usize) -> Vec<Map> {
     let joints = conditions.columns.travel.len();
     (0..joints)
         .map(|joint| {

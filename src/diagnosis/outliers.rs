@@ -24,17 +24,17 @@ pub(super) fn median(equations: usize) -> f64 {
 
 /// What there is of outliers.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outliers {
+pub(crate) struct Outliers {
     /// Probability that some readings have a larger noise.
-    pub probability: f64,
+    pub(crate) probability: f64,
     /// Share of the readings, with its 95 % interval.
-    pub share: f64,
+    pub(crate) share: f64,
     /// 95 % interval of the share.
     pub share_ci95: [f64; 2],
     /// Their noise over that of the others.
-    pub factor: f64,
+    pub(crate) factor: f64,
     /// Rows that are outliers with the probability [`settings::Outliers::row`]; none where there are likely no outliers.
-    pub rows: Vec<usize>,
+    pub(crate) rows: Vec<usize>,
 }
 
 /// The typical square of a good reading, over one sigma's. `counts`: equations of each.
@@ -46,7 +46,7 @@ fn level(squares: &[f64], counts: &[usize]) -> f64 {
 
 /// Weights of readings with these squared residuals, of so many equations each (Huber's, on the squares): one for all but rare ones.
 #[must_use]
-pub fn weights(squares: &[f64], counts: &[usize]) -> Vec<f64> {
+pub(crate) fn weights(squares: &[f64], counts: &[usize]) -> Vec<f64> {
     let level = level(squares, counts);
     // Twice as far off counts a quarter, then less and less: an outlier tells nothing.
     let weight = |(square, count): (&f64, &usize)| {
@@ -58,7 +58,7 @@ pub fn weights(squares: &[f64], counts: &[usize]) -> Vec<f64> {
 
 /// The evidence for outliers among readings with these squared residuals, of so many equations each.
 #[must_use]
-pub fn look(squares: &[f64], counts: &[usize], settings: &settings::Outliers) -> Outliers {
+pub(crate) fn look(squares: &[f64], counts: &[usize], settings: &settings::Outliers) -> Outliers {
     let level = level(squares, counts);
     let density =
         |(square, count): (f64, usize), scale: f64| libm::exp(-0.5 * square / scale) / libm::pow(scale, 0.5 * count as f64);

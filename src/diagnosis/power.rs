@@ -33,15 +33,15 @@ const OUT_OF_PLAY: f64 = -6.0;
 
 /// The power of a claim.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Power {
+pub(crate) struct Power {
     /// Least magnitude, SI; `None` where nothing survives.
-    pub least: Option<f64>,
+    pub(crate) least: Option<f64>,
     /// Named hypothesis of another claim that is most alike, and how much (cosine squared).
-    pub alike: Option<(usize, f64)>,
+    pub(crate) alike: Option<(usize, f64)>,
 }
 
 /// Finds what a data set would show.
-pub struct Bench<'a> {
+pub(crate) struct Bench<'a> {
     settings: &'a Settings,
     candidates: &'a Candidates,
     marginal: &'a Marginal<'a>,
@@ -106,7 +106,7 @@ struct Draw {
 impl<'a> Bench<'a> {
     /// For data with this `evidence`, with a noise of mean square `noise` (in declared sigmas), and with the effects `found`, beside which everything else has to show.
     #[must_use]
-    pub fn new(evidence: &Evidence<'a>, noise: f64, found: &'a [(usize, usize)]) -> Bench<'a> {
+    pub(crate) fn new(evidence: &Evidence<'a>, noise: f64, found: &'a [(usize, usize)]) -> Bench<'a> {
         let Evidence { marginal, candidates, noise: prior, settings } = *evidence;
         let inverses = (0..candidates.hypotheses.len())
             .map(|hypothesis| {
@@ -155,7 +155,7 @@ impl<'a> Bench<'a> {
 
     /// The power of the claim whose variants are `variants`, each as likely.
     #[must_use]
-    pub fn power(&self, variants: &[usize]) -> Power {
+    pub(crate) fn power(&self, variants: &[usize]) -> Power {
         let shows = |variant: &usize| self.information(*variant) / self.noise >= self.settings.power.nothing;
         let seen: Vec<usize> = variants.iter().copied().filter(shows).collect();
         if seen.is_empty() || (seen.len() as f64) < self.settings.power.surviving * variants.len() as f64 {

@@ -20,14 +20,14 @@ use crate::solver::whitening::Whitening;
 
 /// A joint that does not repeat.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scatter {
+pub(crate) struct Scatter {
     /// The joint, from 0.
-    pub joint: usize,
+    pub(crate) joint: usize,
     /// One sigma of its error beside a sensor that is as good as declared, rad or (where it slides) m; where the noise is larger, so is
     /// this.
-    pub sigma: f64,
+    pub(crate) sigma: f64,
     /// Logarithm of the odds of it against the sensor alone.
-    pub log_odds: f64,
+    pub(crate) log_odds: f64,
 }
 
 /// Whether both are the same joints, their sigmas alike.

@@ -16,34 +16,34 @@ const BETTER: f64 = 1e-6;
 const NEGLIGIBLE: f64 = 1e-9;
 
 /// What is claimed: a kind (or none) at a place.
-pub type Claim = (Option<Kind>, Location);
+pub(crate) type Claim = (Option<Kind>, Location);
 
 /// A claim with its probability and the hypothesis that stands for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Belief {
+pub(crate) struct Belief {
     /// The claim.
-    pub claim: Claim,
+    pub(crate) claim: Claim,
     /// Its likeliest variant.
-    pub hypothesis: usize,
+    pub(crate) hypothesis: usize,
     /// That it is there.
-    pub probability: f64,
+    pub(crate) probability: f64,
 }
 
 /// What a search found.
 #[derive(Clone, Debug, Default)]
-pub struct Found {
+pub(crate) struct Found {
     /// The likeliest set: hypotheses and scales of their priors, in the order in which they help most.
-    pub best: Vec<(usize, usize)>,
+    pub(crate) best: Vec<(usize, usize)>,
     /// Of each member of the best set, what may be in its place, likeliest first; what is missing from one is that nothing is.
-    pub causes: Vec<Vec<Belief>>,
+    pub(crate) causes: Vec<Vec<Belief>>,
     /// Every claim with its probability, likeliest first.
-    pub claims: Vec<Belief>,
+    pub(crate) claims: Vec<Belief>,
 }
 
 impl Found {
     /// The probability of `claim`.
     #[must_use]
-    pub fn probability(&self, claim: Claim) -> f64 {
+    pub(crate) fn probability(&self, claim: Claim) -> f64 {
         self.claims.iter().find(|belief| belief.claim == claim).map_or(0.0, |belief| belief.probability)
     }
 }
@@ -56,7 +56,7 @@ fn claim(evidence: &Evidence<'_>, hypothesis: usize) -> Claim {
 
 /// The likeliest set that can be reached from `start`, of `most` effects at most, and the logarithm of its posterior.
 #[must_use]
-pub fn climb(evidence: &Evidence<'_>, start: &[(usize, usize)], most: usize) -> (Vec<(usize, usize)>, f64) {
+pub(crate) fn climb(evidence: &Evidence<'_>, start: &[(usize, usize)], most: usize) -> (Vec<(usize, usize)>, f64) {
     let mut members = start.to_vec();
     let mut value = evidence.log_posterior(&members);
     loop {
@@ -98,7 +98,7 @@ fn best_addition(evidence: &Evidence<'_>, members: &[(usize, usize)]) -> Option<
 
 /// Searches from `start` on. `most`: effects of a set at most.
 #[must_use]
-pub fn search(evidence: &Evidence<'_>, start: &[(usize, usize)], most: usize) -> Found {
+pub(crate) fn search(evidence: &Evidence<'_>, start: &[(usize, usize)], most: usize) -> Found {
     let (best, _) = climb(evidence, start, most);
     walk(evidence, &best, most)
 }

@@ -21,14 +21,14 @@ const PASSES: usize = 4;
 /// Readings with the folds of their diagnosis and the weights that they have beside the effects named: the same for every step of a
 /// waterfall.
 #[derive(Clone, Debug)]
-pub struct Waterfall<'a> {
+pub(crate) struct Waterfall<'a> {
     arm: &'a Arm,
     sensor: &'a Sensor,
     measurements: &'a [&'a Measurement],
     /// Geometry fitted beside the effects.
-    pub rows: Rows,
+    pub(crate) rows: Rows,
     /// Readings as signatures see them.
-    pub conditions: Conditions,
+    pub(crate) conditions: Conditions,
     scheme: Scheme,
     weights: Vec<f64>,
     good: Vec<bool>,
@@ -41,7 +41,7 @@ impl<'a> Waterfall<'a> {
     ///
     /// # Errors
     /// If the measurements cannot tell where the arm stands, or are not this robot's.
-    pub fn new(
+    pub(crate) fn new(
         arm: &'a Arm,
         sensor: &'a Sensor,
         measurements: &'a [&'a Measurement],
@@ -80,7 +80,7 @@ impl<'a> Waterfall<'a> {
     /// they are: loads are those of the arm as it stands with them, also where the diagnosis found that the readings already say where it
     /// stands.
     #[must_use]
-    pub fn together(&self, effects: &[Effect]) -> Vec<Displacement> {
+    pub(crate) fn together(&self, effects: &[Effect]) -> Vec<Displacement> {
         let present = |reading: &Reading| -> Vec<Present> {
             let known = effects.iter().filter_map(|effect| {
                 let signature = effect.signature.as_ref().filter(|signature| signature.shape.can_be_read(reading))?;
@@ -102,7 +102,7 @@ impl<'a> Waterfall<'a> {
     /// What `effect` does to the target in each reading (shift in m, turn in rad, in root), to first order: the columns of what it was
     /// diagnosed to follow times their coefficients. `None` where it follows nothing (outliers), or where the readings lack what it needs.
     #[must_use]
-    pub fn displacements(&self, effect: &Effect) -> Option<Vec<Displacement>> {
+    pub(crate) fn displacements(&self, effect: &Effect) -> Option<Vec<Displacement>> {
         let signature = effect.signature.as_ref()?;
         let orientation = self.rows.equations.has_orientation();
         self.conditions.readings.iter().map(|reading| signature.displacement(reading, orientation)).collect()
@@ -113,7 +113,7 @@ impl<'a> Waterfall<'a> {
     ///
     /// # Errors
     /// If what remains is not this robot's.
-    pub fn after(&self, displacements: &[Displacement]) -> Result<f64, DiagnosisError> {
+    pub(crate) fn after(&self, displacements: &[Displacement]) -> Result<f64, DiagnosisError> {
         use rayon::prelude::*;
         let (sensor, measurements) = (self.sensor, self.measurements);
         let squares: Vec<(f64, usize)> = (0..self.scheme.folds)
