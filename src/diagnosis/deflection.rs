@@ -148,6 +148,7 @@ mod tests {
 
     use super::*;
     use crate::diagnosis::tests::with_analysis;
+    use crate::measurement::Measurement;
 
     #[test]
     fn a_twist_is_a_turn_about_its_axis() {
@@ -203,11 +204,12 @@ mod tests {
                 let location = Location { level: Level::Joint, index: Some(2) };
                 let missed = |compliance: f64| -> f64 {
                     let yields = [Present { location, shape, coefficients: vec![compliance] }];
-                    let of = |reading: &Reading| {
-                        let found = deflected(rows, reading, 0.0, &yields, Loads::AsItStands).displacement;
+                    let of = |(reading, row): (&Reading, &&Measurement)| {
+                        let payload_kg = row.payload_kg.unwrap_or(0.0);
+                        let found = deflected(rows, reading, payload_kg, &yields, Loads::AsItStands).displacement;
                         (shift(&found) - shift(&shape.columns(reading, false)[0]) * compliance).norm_squared()
                     };
-                    analysis.linear.readings.iter().map(of).sum::<f64>().sqrt()
+                    analysis.linear.readings.iter().zip(analysis.measurements).map(of).sum::<f64>().sqrt()
                 };
                 let ratio = missed(2e-5) / missed(1e-5);
                 assert!((3.8..4.2).contains(&ratio), "{ratio}");

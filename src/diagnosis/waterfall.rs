@@ -146,7 +146,7 @@ mod tests {
     /// The waterfall from geometry to the noise, with readings of which only the play is wrong.
     #[test]
     fn the_true_cause_takes_held_out_errors_down_to_the_noise() {
-        let width = 4e-4;
+        let width = 8e-4;
         let (arm, rows) = readings(
             "test/waterfall",
             |_, _, approach, joint, _| {
