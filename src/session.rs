@@ -16,6 +16,7 @@ use crate::identification::outcome::Identification;
 use crate::identification::{self, IdentificationError, identify};
 use crate::measurement::{Measurement, Role, Sensor};
 use crate::progress::Stopped;
+use crate::report::wording;
 use crate::scene::{self, Scene, SceneError};
 use crate::simulation::cell::measure::MeasureError;
 use crate::simulation::cell::plan::{Planned, as_measured, plan};
@@ -253,7 +254,7 @@ pub fn diagnose(scene: &Scene, measurements: &[Measurement]) -> Result<Diagnosis
 fn diagnose_with(scene: &Scene, measurements: &[Measurement], settings: &Settings) -> Result<Diagnosis, DiagnosisError> {
     let rows: Vec<&Measurement> = measurements.iter().collect();
     let options = Options { settings: settings.clone(), ..Options::new(NoiseSource::Declared) };
-    let mut diagnosis = diagnosis::diagnose(&scene.arm, &scene.sensor, &rows, &options)?;
+    let mut diagnosis = wording::diagnosis(diagnosis::diagnose(&scene.arm, &scene.sensor, &rows, &options)?);
     diagnosis.notes.extend(scene.urdf_notes.iter().cloned());
     Ok(diagnosis)
 }

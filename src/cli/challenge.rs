@@ -16,9 +16,10 @@ use crate::lab::challenge::folder::{self, COMMITMENT, MANIFEST, SEAL};
 use crate::lab::challenge::score::{self, closes, restorable};
 use crate::lab::challenge::verdict::{Diagnose, Gap, Verdict, nothing};
 use crate::lab::challenge::{CaseTruth, Folder, Options, TrueEffect, case};
+use crate::lab::report;
 use crate::lab::reproduce::arms::arm8;
 use crate::recording::truth_file::write_whole;
-use crate::report;
+use crate::report::wording;
 use crate::scene::SceneFile;
 use crate::simulation::cell;
 
@@ -48,7 +49,7 @@ fn diagnosed_among(case: &folder::Case, only: Option<Vec<(Kind, Location)>>) -> 
     let usual = crate::diagnosis::Options::new(crate::diagnosis::outcome::NoiseSource::Declared);
     let options = crate::diagnosis::Options { without, only, settings: scene.diagnosis.clone(), ..usual };
     let found = crate::diagnosis::diagnose(&scene.arm, &scene.sensor, &rows, &options).map_err(|error| error.to_string())?;
-    serde_json::to_value(&found).map_err(|error| error.to_string())
+    serde_json::to_value(wording::diagnosis(found)).map_err(|error| error.to_string())
 }
 
 pub(crate) fn command(global: &Global, command: &ChallengeCommand) -> anyhow::Result<Outcome> {

@@ -15,7 +15,7 @@ use crate::event::{Event, Start};
 use crate::lab::confirm::{Answer, confirm};
 use crate::measurement::{Measurement, Sensor, table};
 use crate::progress::Progress as _;
-use crate::{report, scene, session};
+use crate::{lab, report, scene, session};
 
 pub(crate) fn command(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Outcome> {
     let mut without = Vec::new();
@@ -30,8 +30,9 @@ pub(crate) fn command(global: &Global, options: &DiagnoseOptions) -> anyhow::Res
     let rows: Vec<&Measurement> = subject.measurements.iter().collect();
     let settings = settings(&subject.settings, &options.set)?;
     let options_of_diagnosis = Options { without, settings, ..Options::new(subject.noise) };
-    let mut diagnosis = diagnosis::diagnose(&subject.arm, &subject.sensor, &rows, &options_of_diagnosis)
+    let conclusion = diagnosis::diagnose(&subject.arm, &subject.sensor, &rows, &options_of_diagnosis)
         .with_context(|| options.input.display().to_string())?;
+    let mut diagnosis = report::wording::diagnosis(conclusion);
     diagnosis.notes.extend(subject.notes.iter().cloned());
     show(global, options, &subject, &diagnosis)?;
     let confirmation = if options.confirm {
@@ -43,7 +44,7 @@ pub(crate) fn command(global: &Global, options: &DiagnoseOptions) -> anyhow::Res
     let mut json = serde_json::to_value(&diagnosis)?;
     output::show(global, &report::diagnosis::text(&diagnosis))?;
     if let Some(confirmation) = &confirmation {
-        output::show(global, &report::confirm::text(confirmation))?;
+        output::show(global, &lab::report::confirm::text(confirmation))?;
         json["confirmation"] = serde_json::to_value(confirmation)?;
     }
     output::show_json(global, &json)?;

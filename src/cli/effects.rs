@@ -8,7 +8,7 @@ use super::arguments::{EffectsOptions, Global};
 use super::bar::Bar;
 use super::output;
 use crate::lab::effect_validation::{self, Line};
-use crate::report;
+use crate::lab::report;
 
 pub(crate) fn command(global: &Global, options: &EffectsOptions) -> anyhow::Result<Outcome> {
     let Some(path) = &options.scene else {

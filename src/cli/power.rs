@@ -13,8 +13,8 @@ use crate::arm::Arm;
 use crate::effects::Kind;
 use crate::lab::challenge::{case, power};
 use crate::lab::injection;
+use crate::lab::report;
 use crate::recording::truth_file::write_whole;
-use crate::report;
 
 /// What is checked if nobody says what.
 const USUAL: [Kind; 5] = [Kind::Backlash, Kind::JointCompliance, Kind::JointEccentricity, Kind::TiltClearance, Kind::BaseStep];

@@ -10,12 +10,12 @@ use super::Outcome;
 use super::arguments::{Global, ReproduceOptions};
 use super::bar::Bar;
 use super::output;
+use crate::lab::report::findings as report;
 use crate::lab::reproduce::arms::arms;
 use crate::lab::reproduce::bench::Bench;
 use crate::lab::reproduce::findings::Findings;
 use crate::lab::reproduce::{ALL, BEYOND, Experiment};
 use crate::recording::truth_file::write_whole;
-use crate::report::findings as report;
 use crate::scene::{self, SceneFile};
 use crate::simulation::cell;
 

@@ -16,12 +16,12 @@ use crate::design::problem::Method;
 use crate::effects::Kind;
 use crate::effects::Level;
 use crate::lab::injection::{self, magnitudes, written};
+use crate::lab::report;
 use crate::lab::sweep::grid::{COURSES, Injecting, SCENES_COURSE};
 use crate::lab::sweep::results::{Reader, merge};
 use crate::lab::sweep::{Background, CellSummary, Grid, Header, Reduction, Results, Sweep};
 use crate::recording::tables::{self, Table};
 use crate::recording::truth_file::write_whole;
-use crate::report;
 use crate::scene::Scene;
 use crate::simulation::cell;
 

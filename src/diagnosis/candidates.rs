@@ -75,3 +75,90 @@ pub(super) fn odds_of_one_more_unnamed(candidates: &Candidates, joints: usize, p
     let classes: BTreeSet<Class> = nameless.map(|(of, _)| class(of)).collect();
     libm::log(prior.odds * prior.unnamed / ((classes.len() + 1) * joints) as f64)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::evidence::one_signed;
+    use crate::diagnosis::settings::Settings;
+    use crate::diagnosis::tests::with_analysis;
+    use crate::effects::signature::library::{Columns, library};
+    use crate::effects::signature::shape::Shape;
+    use crate::effects::{Level, Location};
+
+    fn hypothesis(kind: Option<Kind>, joint: usize, share: Option<f64>, width: usize) -> Hypothesis {
+        Hypothesis {
+            share,
+            kind,
+            location: Location { level: Level::Joint, index: Some(joint) },
+            shape: Shape::Softening { joint },
+            range: [0.5, 2.0],
+            spread: vec![1.0; width],
+            detail: String::new(),
+        }
+    }
+
+    #[test]
+    fn columns_follow_each_other_and_a_unit_is_the_middle_of_the_range() {
+        let of = candidates([2, 1, 3].map(|width| hypothesis(None, 1, None, width)).to_vec());
+        assert_eq!((0..3).map(|number| of.columns(number)).collect::<Vec<_>>(), [0..2, 2..3, 3..6]);
+        assert_eq!(of.unit, [1.0; 3]);
+    }
+
+    /// The prior as a tree, leaf by leaf: a quarter of it for shapes without a name; kinds, then places, then variants alike.
+    #[test]
+    fn the_prior_is_shared_by_kinds_then_places_then_variants() {
+        let (play, runout) = (Some(Kind::Backlash), Some(Kind::JointEccentricity));
+        let mut of = candidates(vec![
+            hypothesis(play, 1, None, 1),
+            hypothesis(play, 2, None, 1),
+            hypothesis(runout, 1, None, 1),
+            hypothesis(runout, 1, None, 1),
+            hypothesis(runout, 1, None, 1),
+            hypothesis(None, 2, None, 1),
+            hypothesis(Some(Kind::LinkBending), 1, Some(0.25), 1),
+            hypothesis(Some(Kind::LinkBending), 1, Some(0.75), 1),
+            // Nothing of it survives geometry: neither it nor its kind has a part.
+            hypothesis(Some(Kind::GearCoupling), 1, None, 1),
+        ]);
+        let prior = Prior { odds: 2.0, ..Settings::default().prior };
+        // Twice the unit is the upper end: information of one there makes 4, just enough.
+        let information = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.999];
+        weigh(&mut of, &information, &prior);
+        let expected = [0.125, 0.125, 0.25 / 3.0, 0.25 / 3.0, 0.25 / 3.0, 0.25, 0.0625, 0.1875, 0.0];
+        for (number, share) in expected.into_iter().enumerate() {
+            let found = of.log_odds[number].exp() / 2.0;
+            assert!((found - share).abs() < 1e-12, "{number}: {found} against {share}");
+        }
+        assert_eq!(of.active, [true, true, true, true, true, true, true, true, false]);
+        let all: f64 = of.log_odds.iter().map(|log| log.exp()).sum();
+        assert!((all - 2.0).abs() < 1e-12, "{all}");
+    }
+
+    /// A ripple that a scan found has the part of one of all that were scanned, at one of all joints.
+    #[test]
+    fn what_a_scan_found_is_no_likelier_than_what_it_did_not_find() {
+        let mut of = candidates(vec![hypothesis(None, 4, Some(0.01), 1), hypothesis(None, 6, None, 1)]);
+        weigh(&mut of, &[1.0; 2], &Settings::default().prior);
+        // Both are of one family; the arm has six joints or more.
+        assert!((of.log_odds[0].exp() - 0.25 * 0.01 / 6.0).abs() < 1e-12);
+        assert!((of.log_odds[1].exp() - 0.25 / 2.0).abs() < 1e-12);
+    }
+
+    /// The evidence restricts the sign of the first coefficient alone.
+    #[test]
+    fn what_has_one_sign_has_one_coefficient() {
+        with_analysis(
+            |_, _, _, _, _| 0.0,
+            |analysis| {
+                let columns = Columns { temperature: true, ..analysis.conditions.columns.clone() };
+                let all = library(&analysis.linear.rows.mechanism, &columns);
+                let kinds: BTreeSet<Kind> = all.iter().filter(|of| one_signed(of)).filter_map(|of| of.kind).collect();
+                assert!(kinds.len() > 5, "{kinds:?}");
+                for of in all.iter().filter(|of| one_signed(of)) {
+                    assert_eq!(of.spread.len(), 1, "{of:?}");
+                }
+            },
+        );
+    }
+}

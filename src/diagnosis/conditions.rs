@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
+use super::conclusion::Note;
 use super::deflection::{Deflected, Loads, Present, deflected};
 use super::rows::Rows;
 use super::settings::Model;
@@ -12,15 +13,15 @@ use crate::measurement::Measurement;
 
 /// Rows as signatures see them, and what the data have.
 #[derive(Clone, Debug)]
-pub struct Conditions {
+pub(crate) struct Conditions {
     /// Of each row.
-    pub readings: Vec<Reading>,
+    pub(crate) readings: Vec<Reading>,
     /// What there is.
-    pub columns: Columns,
+    pub(crate) columns: Columns,
     /// What is missing.
-    pub notes: Vec<String>,
+    pub(crate) notes: Vec<Note>,
     /// Time of each place in time, s.
-    pub times: Vec<f64>,
+    pub(crate) times: Vec<f64>,
 }
 
 /// The conditions of `measurements`, whose geometry is `rows`, with the effects `present`, which answer to `loads`. `upright`: the joints
@@ -50,13 +51,13 @@ pub(crate) fn conditions(
 
     let approach = measurements.iter().all(|row| row.approach.len() == count);
     if !approach {
-        notes.push("no approach directions: backlash cannot be looked for".to_owned());
+        notes.push(Note::NoApproach);
     }
     let links = measurements.iter().all(|row| row.temperatures_c.len() >= count);
     let ambient = measurements.iter().all(|row| row.ambient_c.is_some());
     let mut temperature = links || ambient;
     if !links && ambient {
-        notes.push("no temperatures of the links: that of the air stands in for all of them".to_owned());
+        notes.push(Note::AirForLinks);
     }
     let temperatures = |row: &Measurement| -> (Vec<f64>, f64) {
         if links {
@@ -78,20 +79,16 @@ pub(crate) fn conditions(
         }
         if spread < settings.temperature_k {
             temperature = false;
-            notes.push("the temperature never changes: thermal effects cannot be looked for".to_owned());
+            notes.push(Note::ConstantTemperature);
         }
     } else {
-        notes.push("no temperatures: thermal effects cannot be looked for".to_owned());
+        notes.push(Note::NoTemperatures);
     }
     if measurements.iter().all(|row| row.payload_kg.is_none()) {
-        notes.push("no payload column: the arm is taken to carry nothing".to_owned());
+        notes.push(Note::NoPayload);
     }
     if !rows.mechanism.masses_known {
-        notes.push(
-            "the robot's file has no masses: each link is taken to weigh 1 kg in its middle, and magnitudes that are driven by load \
-             have no physical unit"
-                .to_owned(),
-        );
+        notes.push(Note::NoMasses);
     }
 
     let mut readings: Vec<Reading> = Vec::with_capacity(total);
@@ -139,7 +136,7 @@ pub(crate) fn conditions(
     };
     let is_upright = |joint: usize| readings.iter().all(|reading| unknown(reading, joint));
     let upright = upright.map_or_else(|| (0..count).map(is_upright).collect(), <[bool]>::to_vec);
-    let margin = (total / 10).max(3);
+    let margin = ((settings.change_margin * total as f64) as usize).max(settings.change_margin_readings);
     let span = total.saturating_sub(2 * margin);
     let stride = span.div_ceil(settings.change_points.max(1)).max(1);
     let changes = (margin..total.saturating_sub(margin)).step_by(stride).collect();
@@ -190,6 +187,6 @@ fn remember(measurements: &[&Measurement], in_time: &[usize], readings: &mut [Re
 
 /// Mean of vectors; zero where there are none.
 #[must_use]
-pub fn centre(points: &[Vector3<f64>]) -> Vector3<f64> {
+pub(crate) fn centre(points: &[Vector3<f64>]) -> Vector3<f64> {
     points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64
 }

@@ -147,6 +147,8 @@ mod tests {
     use nalgebra::Matrix3;
 
     use super::*;
+    use crate::diagnosis::tests::with_analysis;
+    use crate::measurement::Measurement;
 
     #[test]
     fn a_twist_is_a_turn_about_its_axis() {
@@ -159,5 +161,59 @@ mod tests {
         let expected = centre + rotation * (point - centre);
         assert!((motion.of_point(&point) - expected).norm() < 1e-14);
         assert!((motion.of_point(&centre) - centre).norm() < 1e-14);
+    }
+
+    fn shift(of: &Displacement) -> Vector3<f64> {
+        Vector3::new(of[0], of[1], of[2])
+    }
+
+    /// Play of a joint is a turn of the joint, which the chain itself can make; no load changes it.
+    #[test]
+    fn play_is_what_the_chain_does_when_its_joint_turns() {
+        with_analysis(
+            |_, _, _, _, _| 0.0,
+            |analysis| {
+                let rows = analysis.linear.rows;
+                let width = 2e-3;
+                let location = Location { level: Level::Joint, index: Some(3) };
+                let play = [Present { location, shape: Shape::Direction { joint: 2 }, coefficients: vec![width] }];
+                for reading in analysis.linear.readings {
+                    let mut joints = reading.joints.clone();
+                    joints[2] += 0.5 * width * reading.approach[2];
+                    let [still, turned] = [&reading.joints, &joints].map(|joints| rows.mechanism.posture(joints, 0.0));
+                    let offset = still.tool_axes.transpose() * (reading.target - still.tool);
+                    let expected = turned.tool + turned.tool_axes * offset - reading.target;
+                    assert!(expected.norm() > 1e-6);
+                    for loads in [Loads::AsItStands, Loads::AsRead] {
+                        let found = deflected(rows, reading, 0.0, &play, loads).displacement;
+                        assert!((shift(&found) - expected).norm() < 1e-9, "{found:?} against {expected}");
+                    }
+                }
+            },
+        );
+    }
+
+    /// Where a joint yields, the load moves with the arm: what the signature at the undeflected arm misses is of second order.
+    #[test]
+    fn what_first_order_misses_goes_with_the_square() {
+        with_analysis(
+            |_, _, _, _, _| 0.0,
+            |analysis| {
+                let rows = analysis.linear.rows;
+                let shape = Shape::Torque { joint: 1 };
+                let location = Location { level: Level::Joint, index: Some(2) };
+                let missed = |compliance: f64| -> f64 {
+                    let yields = [Present { location, shape, coefficients: vec![compliance] }];
+                    let of = |(reading, row): (&Reading, &&Measurement)| {
+                        let payload_kg = row.payload_kg.unwrap_or(0.0);
+                        let found = deflected(rows, reading, payload_kg, &yields, Loads::AsItStands).displacement;
+                        (shift(&found) - shift(&shape.columns(reading, false)[0]) * compliance).norm_squared()
+                    };
+                    analysis.linear.readings.iter().zip(analysis.measurements).map(of).sum::<f64>().sqrt()
+                };
+                let ratio = missed(2e-5) / missed(1e-5);
+                assert!((3.8..4.2).contains(&ratio), "{ratio}");
+            },
+        );
     }
 }

@@ -1,21 +1,22 @@
 //! What these readings could have shown: the smallest magnitude of each kind at each place.
 
 use super::Analysis;
-use super::claims::{claim, kind_name, place};
+use super::claims::{claim, place};
+use super::conclusion::{Hidden, Reason, Visible};
 use super::evidence::Evidence;
-use super::outcome::{MinimumDetectable, Place, Undetectable};
+use super::outcome::{MinimumDetectable, Place};
 use super::power::Bench;
 use super::products::Marginal;
 use super::search::Claim;
-use super::sentence::words;
+use crate::effects::signature::library::Hypothesis;
 use crate::effects::{Kind, Load, Location, Need};
 
 /// What would show and what would not.
 pub(super) struct Detectability {
     /// What would not show at a realistic magnitude.
-    pub(super) undetectable: Vec<Undetectable>,
+    pub(super) undetectable: Vec<Hidden>,
     /// What would, from which magnitude on.
-    pub(super) detectable: Vec<Undetectable>,
+    pub(super) detectable: Vec<Visible>,
     /// Share of kinds and places that would.
     pub(super) share: f64,
 }
@@ -46,65 +47,64 @@ pub(super) fn detectability(analysis: &Analysis<'_>, noise: f64) -> Detectabilit
         let place = Place { time_s: None, ..place(analysis, variants[0]) };
         let largest = hypothesis.range[1];
         all += 1.0;
-        let value = power.least.filter(|least| least.is_finite() && *least < 1e4 * largest);
-        let least = MinimumDetectable { value, unit: kind.unit().to_owned() };
-        let entry = |reason: String| Undetectable { kind, location: place, minimum_detectable: least.clone(), reason };
-        match value {
+        let value = power.least.filter(|least| least.is_finite() && *least < analysis.options.settings.power.beyond * largest);
+        let minimum_detectable = MinimumDetectable { value, unit: kind.unit().to_owned() };
+        let reason = match value {
             Some(value) if value <= largest => {
                 seen += 1.0;
-                detectable.push(entry(String::new()));
+                detectable.push(Visible { kind, location: place, minimum_detectable });
+                continue;
             }
             Some(_) => {
-                let alike = power.alike.filter(|(_, likeness)| *likeness > analysis.options.settings.power.likeness_said).map(
-                    |(other, likeness)| {
-                        let that = &candidates.hypotheses[other];
-                        let words = words(kind_name(that.kind), &that.location);
-                        format!("cannot be told from {words} (likeness {:.2}) at a realistic size", libm::sqrt(likeness))
-                    },
-                );
-                let reason = alike.unwrap_or_else(|| "a realistic size is lost in the noise, or geometry absorbs it".to_owned());
-                undetectable.push(entry(reason));
+                let alike = power.alike.filter(|(_, likeness)| *likeness > analysis.options.settings.power.likeness_said);
+                let like = alike.and_then(|(other, likeness)| {
+                    let Hypothesis { kind, location, .. } = candidates.hypotheses[other];
+                    Some(Reason::Like { kind: kind?, location, likeness: libm::sqrt(likeness) })
+                });
+                like.unwrap_or(Reason::TooSmall)
             }
-            None => undetectable.push(entry(why_nothing(kind).to_owned())),
-        }
+            None => why_nothing(kind),
+        };
+        undetectable.push(Hidden { kind, location: place, minimum_detectable, reason });
     }
     let columns = &analysis.conditions.columns;
     let joints = analysis.linear.rows.mechanism.joint_count();
-    let mut missing = |kind: Kind, reason: &str| {
+    let mut missing = |kind: Kind, reason: Reason| {
         for joint in 1..=joints {
             if !analysis.options.wants(Some(kind), Location { level: kind.level(), index: Some(joint) }) {
                 continue;
             }
             all += 1.0;
-            undetectable.push(Undetectable {
+            undetectable.push(Hidden {
                 kind,
                 location: Place { level: kind.level(), index: Some(joint), time_s: None },
                 minimum_detectable: MinimumDetectable { value: None, unit: kind.unit().to_owned() },
-                reason: reason.to_owned(),
+                reason,
             });
         }
     };
     for kind in Kind::known() {
         let needs = kind.descriptor().needs;
         if needs.contains(&Need::ApproachSides) && !columns.approach {
-            missing(kind, "no approach directions were recorded");
+            missing(kind, Reason::NoApproach);
         }
         if needs.contains(&Need::Temperatures) && !columns.temperature {
-            missing(kind, "no temperatures that change were recorded");
+            missing(kind, Reason::NoTemperatures);
         }
     }
     Detectability { undetectable, detectable, share: seen / f64::max(all, 1.0) }
 }
 
-fn why_nothing(kind: Kind) -> &'static str {
+/// Why no magnitude of `kind` would show.
+fn why_nothing(kind: Kind) -> Reason {
     let of = kind.descriptor();
     if of.load != Load::None {
-        "gravity loads this joint not at all, or always alike"
+        Reason::LoadedAlike
     } else if of.needs.contains(&Need::ApproachSides) {
-        "the joint is always approached from the same side"
+        Reason::OneSide
     } else if kind == Kind::MeasurementScale {
-        "link lengths that are fitted absorb it wholly; a scale bar would show it"
+        Reason::LengthsAbsorb
     } else {
-        "geometry absorbs it wholly on these configurations"
+        Reason::GeometryAbsorbs
     }
 }

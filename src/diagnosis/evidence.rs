@@ -13,28 +13,28 @@ use crate::effects::signature::shape::Shape;
 
 /// What is known of the noise beforehand: so many readings' worth (degrees of freedom) of a mean square, in declared sigmas.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NoisePrior {
+pub(crate) struct NoisePrior {
     /// Degrees of freedom.
-    pub degrees_of_freedom: f64,
+    pub(crate) degrees_of_freedom: f64,
     /// Mean square over the declared one.
-    pub level: f64,
+    pub(crate) level: f64,
 }
 
 /// The hypotheses in play, and where their columns are.
 #[derive(Clone, Debug)]
-pub struct Candidates {
+pub(crate) struct Candidates {
     /// What they are.
-    pub hypotheses: Vec<Hypothesis>,
+    pub(crate) hypotheses: Vec<Hypothesis>,
     /// First column of each.
-    pub first: Vec<usize>,
+    pub(crate) first: Vec<usize>,
     /// Magnitude that a coefficient of one stands for.
-    pub unit: Vec<f64>,
+    pub(crate) unit: Vec<f64>,
     /// Logarithm of the prior odds of having it over not.
-    pub log_odds: Vec<f64>,
+    pub(crate) log_odds: Vec<f64>,
     /// Whether it is in play.
-    pub active: Vec<bool>,
+    pub(crate) active: Vec<bool>,
     /// From this number on they were not looked for before the readings were seen: scans of what remained have found them.
-    pub scanned: usize,
+    pub(crate) scanned: usize,
 }
 
 /// Logarithm of how much likelier a set of `count` effects is beforehand than their own odds say: any number of effects is as likely as
@@ -43,40 +43,29 @@ fn log_multiplicity(count: usize) -> f64 {
     (1..=count).map(|number| libm::log(number as f64)).sum()
 }
 
-/// A set of effects, each with the scale of its prior.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Model {
-    /// Hypothesis and scale, in the order added.
-    pub members: Vec<(usize, usize)>,
-    /// Logarithm of posterior over that of the empty set.
-    pub log_posterior: f64,
-}
-
 /// The coefficients of a model.
 #[derive(Clone, Debug)]
-pub struct Fit {
+pub(crate) struct Fit {
     /// Columns.
-    pub columns: Vec<usize>,
+    pub(crate) columns: Vec<usize>,
     /// Posterior means.
-    pub coefficients: DVector<f64>,
+    pub(crate) coefficients: DVector<f64>,
     /// Posterior covariance over the noise's mean square.
-    pub covariance: DMatrix<f64>,
-    /// By how much the residual's square drops.
-    pub drop: f64,
+    pub(crate) covariance: DMatrix<f64>,
     /// Posterior mean of the noise's mean square, in declared sigmas.
-    pub noise: f64,
+    pub(crate) noise: f64,
 }
 
 impl Candidates {
     /// Columns of a hypothesis.
     #[must_use]
-    pub fn columns(&self, hypothesis: usize) -> std::ops::Range<usize> {
+    pub(crate) fn columns(&self, hypothesis: usize) -> std::ops::Range<usize> {
         self.first[hypothesis]..self.first[hypothesis] + self.hypotheses[hypothesis].spread.len()
     }
 
     /// Whether both cannot be in one model: they are the same thing.
     #[must_use]
-    pub fn exclude(&self, a: usize, b: usize) -> bool {
+    pub(crate) fn exclude(&self, a: usize, b: usize) -> bool {
         if a == b {
             return true;
         }
@@ -105,7 +94,7 @@ fn overlap(a: &Hypothesis, b: &Hypothesis) -> bool {
 
 /// Whether physics allows only one sign.
 #[must_use]
-pub fn one_signed(hypothesis: &Hypothesis) -> bool {
+pub(crate) fn one_signed(hypothesis: &Hypothesis) -> bool {
     hypothesis.kind.is_some_and(|kind| kind.descriptor().one_signed)
 }
 
@@ -120,15 +109,15 @@ struct Solved {
 
 /// The evidence of sets of effects, given what survives of the geometry.
 #[derive(Clone, Copy)]
-pub struct Evidence<'a> {
+pub(crate) struct Evidence<'a> {
     /// What survives of the geometry.
-    pub marginal: &'a Marginal<'a>,
+    pub(crate) marginal: &'a Marginal<'a>,
     /// The hypotheses.
-    pub candidates: &'a Candidates,
+    pub(crate) candidates: &'a Candidates,
     /// What is known of the noise.
-    pub noise: NoisePrior,
+    pub(crate) noise: NoisePrior,
     /// What is likely beforehand, and how it is searched.
-    pub settings: &'a Settings,
+    pub(crate) settings: &'a Settings,
 }
 
 /// An effect more.
@@ -186,7 +175,7 @@ impl<'a> Evidence<'a> {
 
     /// Evidence and prior of `members` together, over those of no effect.
     #[must_use]
-    pub fn log_posterior(&self, members: &[(usize, usize)]) -> f64 {
+    pub(crate) fn log_posterior(&self, members: &[(usize, usize)]) -> f64 {
         if members.is_empty() {
             return 0.0;
         }
@@ -240,7 +229,7 @@ impl<'a> Evidence<'a> {
     /// Logarithm of the marginal likelihood of the readings with `members`, up to what does not depend on members and on the
     /// geometry's prior: for the comparison of such priors.
     #[must_use]
-    pub fn log_likelihood(&self, members: &[(usize, usize)]) -> f64 {
+    pub(crate) fn log_likelihood(&self, members: &[(usize, usize)]) -> f64 {
         let (drop, log_determinant) = self.solve(members).map_or((0.0, 0.0), |model| (model.drop, model.log_determinant));
         let degrees = self.noise.degrees_of_freedom + self.marginal.degrees_of_freedom;
         let left = self.noise.degrees_of_freedom * self.noise.level + self.marginal.residual - drop;
@@ -249,33 +238,32 @@ impl<'a> Evidence<'a> {
 
     /// Posterior mean of the noise's mean square beside `members`, in declared sigmas.
     #[must_use]
-    pub fn noise_level(&self, members: &[(usize, usize)]) -> f64 {
+    pub(crate) fn noise_level(&self, members: &[(usize, usize)]) -> f64 {
         self.level(self.solve(members).map_or(0.0, |model| model.drop))
     }
 
     /// The coefficients of `members`.
     #[must_use]
-    pub fn fit(&self, members: &[(usize, usize)]) -> Option<Fit> {
+    pub(crate) fn fit(&self, members: &[(usize, usize)]) -> Option<Fit> {
         let model = self.solve(members)?;
         Some(Fit {
             noise: self.level(model.drop),
             columns: model.columns,
             coefficients: model.coefficients,
             covariance: model.inverse,
-            drop: model.drop,
         })
     }
 
     /// Columns and coefficients of `members`.
     #[must_use]
-    pub fn coefficients(&self, members: &[(usize, usize)]) -> Vec<(usize, f64)> {
+    pub(crate) fn coefficients(&self, members: &[(usize, usize)]) -> Vec<(usize, f64)> {
         let fit = self.fit(members);
         fit.map_or_else(Vec::new, |fit| fit.columns.into_iter().zip(fit.coefficients.iter().copied()).collect())
     }
 
     /// All sets that have one effect more than `members`.
     #[must_use]
-    pub fn extensions(&self, members: &[(usize, usize)]) -> Vec<Extension> {
+    pub(crate) fn extensions(&self, members: &[(usize, usize)]) -> Vec<Extension> {
         let (marginal, candidates) = (self.marginal, self.candidates);
         let Some(base) = self.solve(members) else {
             return Vec::new();
@@ -350,7 +338,8 @@ impl<'a> Evidence<'a> {
                 let factor = cholesky.l_dirty();
                 let log_determinant =
                     (0..width).map(|i| 2.0 * libm::log(factor[(i, i)])).sum::<f64>() - width as f64 * libm::log(precision);
-                put(scale, right.dot(&coefficients), log_determinant, coefficients[0], 0.0);
+                let variance = if signed { cholesky.inverse()[(0, 0)] } else { 0.0 };
+                put(scale, right.dot(&coefficients), log_determinant, coefficients[0], variance);
             }
         }
         found
@@ -367,5 +356,57 @@ pub(super) fn log_allowed(z: f64) -> f64 {
         -0.5 * z * z - libm::log(-z) - 0.919 + 0.693
     } else {
         libm::log(libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::products::test_marginal;
+    use crate::effects::{Kind, Level, Location};
+    use crate::seed::stream;
+
+    /// The normal distribution's table, and its tail's first term far out.
+    #[test]
+    fn the_share_that_physics_allows_is_that_of_the_normal_distribution() {
+        for (z, share) in [(0.0, 0.5), (1.0, 0.841_345), (-1.0, 0.158_655), (-3.0, 0.001_349_898), (6.5, 1.0)] {
+            let found = 0.5 * log_allowed(z).exp();
+            assert!((found / share - 1.0).abs() < 1e-5, "{z}: {found}");
+        }
+        assert!((log_allowed(-6.0 - 1e-9) - log_allowed(-6.0 + 1e-9)).abs() < 0.03);
+    }
+
+    /// No kind of the table is one-signed with several coefficients; one that were would be held to the sign of the first.
+    #[test]
+    fn one_sign_holds_for_the_first_of_several_coefficients_too() {
+        let of = Hypothesis {
+            share: None,
+            kind: Some(Kind::JointCompliance),
+            location: Location { level: Level::Joint, index: Some(1) },
+            shape: Shape::Torque { joint: 0 },
+            range: [0.5, 2.0],
+            spread: vec![1.0; 2],
+            detail: String::new(),
+        };
+        let candidates =
+            Candidates { hypotheses: vec![of], first: vec![0], unit: vec![1.0], log_odds: vec![-1.0], active: vec![true] };
+        let (noise, settings) = (NoisePrior { degrees_of_freedom: 10.0, level: 1.0 }, Settings::default());
+        let mut draws = stream(4, "test/one-signed");
+        let signatures = DMatrix::from_fn(80, 2, |_, _| draws.normal());
+        let errors = DVector::from_fn(80, |_, _| draws.normal());
+        let value = |sign: f64| {
+            let residual = &errors + signatures.column(0) * sign;
+            let products = test_marginal(&candidates, &signatures, &residual);
+            let marginal = products.marginal();
+            let evidence = Evidence { marginal: &marginal, candidates: &candidates, noise, settings: &settings };
+            let found = evidence.extensions(&[]);
+            assert_eq!(found.len(), SCALES);
+            for one in &found {
+                let whole = evidence.log_posterior(&[one.member]);
+                assert!((one.log_posterior - whole).abs() < 1e-9 * whole.abs().max(1.0), "{one:?} against {whole}");
+            }
+            found[0].log_posterior
+        };
+        assert!(value(1.0) > value(-1.0) + 10.0);
     }
 }

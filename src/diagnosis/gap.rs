@@ -13,6 +13,8 @@ pub(super) struct Closing<'a> {
     noise_rms_m: f64,
     /// In other ways.
     others: &'a [HeldOut],
+    /// Square of a gap over that of the noise above which shares of it mean something.
+    least: f64,
 }
 
 impl<'a> Closing<'a> {
@@ -25,7 +27,7 @@ impl<'a> Closing<'a> {
         let equations = &analysis.linear.rows.equations;
         let read: usize = (0..equations.readings()).map(|row| equations.of_position(row).len()).sum();
         let axes = read as f64 / equations.readings() as f64;
-        Closing { folds, noise_rms_m: libm::sqrt(axes) * position_m, others }
+        Closing { folds, noise_rms_m: libm::sqrt(axes) * position_m, others, least: analysis.options.settings.decision.gap }
     }
 
     /// Of a sum over the readings of all folds.
@@ -48,7 +50,7 @@ impl<'a> Closing<'a> {
     pub(super) fn closed(&self, before: f64, after: f64) -> Option<f64> {
         let floor2 = self.noise_rms_m * self.noise_rms_m;
         let gap = before * before - floor2;
-        (gap > 0.02 * floor2 && gap > 0.0).then(|| 1.0 - (after * after - floor2) / gap)
+        (gap > self.least * floor2 && gap > 0.0).then(|| 1.0 - (after * after - floor2) / gap)
     }
 
     /// 95 % interval of the share closed, from the folds.
@@ -112,4 +114,66 @@ fn blocked(held_out: &HeldOut) -> Option<Blocked> {
             })
             .collect(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::held_out::Block;
+    use crate::diagnosis::tests::fold_of;
+
+    /// Folds of ten readings with so many squares of the noise, of one each.
+    fn closing(folds: &[Fold]) -> Closing<'_> {
+        Closing { folds, noise_rms_m: 1.0, others: &[], least: 0.02 }
+    }
+
+    #[test]
+    fn shares_of_the_gap_add_up() {
+        let of = closing(&[]);
+        let close = |found: Option<f64>, share: f64| assert!((found.unwrap() - share).abs() < 1e-12, "{found:?}");
+        close(of.closed(2.0, 1.0), 1.0);
+        close(of.closed(2.0, 2.0), 0.0);
+        // Squares add: of 4 over 1, the middle is 2.5.
+        close(of.closed(2.0, 2.5_f64.sqrt()), 0.5);
+        assert!(of.closed(2.0, 3.0).unwrap() < 0.0);
+        // What is above the noise by a hundredth of its square is no gap.
+        assert_eq!(of.closed(1.01_f64.sqrt(), 1.0), None);
+        assert!(of.closed(1.03_f64.sqrt(), 1.0).is_some());
+        assert_eq!(of.closed(0.5, 0.4), None);
+    }
+
+    /// Of a gap of two squares 0.8, 0.4 and nothing are left: shares of 0.6, 0.8 and 1, of mean 0.8 and standard deviation 0.2. Student's t
+    /// of two degrees of freedom is 4.3027.
+    #[test]
+    fn the_interval_is_that_of_student() {
+        let folds = [1.8, 1.4, 1.0].map(|square| fold_of([500.0, 30.0, 10.0 * square], &[], vec![0]));
+        let [low, high] = closing(&folds).interval().unwrap();
+        let half = 4.302_653 * 0.2 / 3_f64.sqrt();
+        assert!((low - (0.8 - half)).abs() < 1e-5 && (high - (0.8 + half)).abs() < 1e-5, "{low} {high}");
+        // Two folds have no interval.
+        assert_eq!(closing(&folds[..2]).interval(), None);
+    }
+
+    #[test]
+    fn held_out_errors_are_of_all_folds_together() {
+        let folds = [fold_of([500.0, 40.0, 10.0], &[20.0, 10.0], vec![0]), fold_of([500.0, 140.0, 10.0], &[60.0], vec![0])];
+        let of = closing(&folds);
+        // Twenty readings: squares of 180, then 80, then 70 (the second fold has one effect only).
+        let near = |found: f64, squares: f64| assert!((found - (squares / 20.0).sqrt()).abs() < 1e-12, "{found} {squares}");
+        near(of.after(0), 180.0);
+        near(of.after(1), 80.0);
+        near(of.after(2), 70.0);
+        near(of.explained(), 20.0);
+        let gap = of.gap();
+        near(gap.nominal_rms_m, 1000.0);
+        assert!((gap.gap_closed.unwrap() - 1.0).abs() < 1e-12);
+        // Where no fold uses anything nothing is closed, whatever the numbers.
+        let idle = [fold_of([500.0, 40.0, 10.0], &[], Vec::new())];
+        assert_eq!(closing(&idle).gap().gap_closed, None);
+        let other = HeldOut { by: Block::Payload, folds: folds.to_vec() };
+        let of_payload = blocked(&other).unwrap();
+        near(of_payload.geometry_rms_m, 180.0);
+        assert!((of_payload.left_out[1].geometry_rms_m - 14_f64.sqrt()).abs() < 1e-12);
+        assert!(blocked(&HeldOut { by: Block::Session, folds: Vec::new() }).is_none());
+    }
 }

@@ -1,5 +1,6 @@
 //! Readings that are not independent: several targets of one pose, repeats without a move, and the same configuration read again.
-//! What geometry and effects leave there is the arm's, once, and the sensor's, each time.
+//! What geometry and effects leave there is the arm's, once, and the sensor's, each time: such readings tell the sensor's noise, and count
+//! for less than as many that are independent.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -12,30 +13,30 @@ use crate::measurement::equations::{COMPONENTS, Equations};
 
 /// Rows of the same configuration.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Groups {
+pub(crate) struct Groups {
     /// Group of each row, numbered by first appearance.
-    pub of: Vec<usize>,
+    pub(crate) of: Vec<usize>,
     /// Rows of each group.
-    pub rows: Vec<Vec<usize>>,
+    pub(crate) rows: Vec<Vec<usize>>,
 }
 
 /// Noise from repeats.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Repeats {
+pub(crate) struct Repeats {
     /// One sigma per axis, m.
-    pub position_m: f64,
+    pub(crate) position_m: f64,
     /// One sigma of an orientation about an axis, rad, where orientations were read.
-    pub orientation_rad: Option<f64>,
+    pub(crate) orientation_rad: Option<f64>,
     /// Degrees of freedom.
-    pub degrees_of_freedom: f64,
+    pub(crate) degrees_of_freedom: f64,
     /// Whether the arm moved between the readings: if not, they show the sensor alone.
-    pub moved: bool,
+    pub(crate) moved: bool,
 }
 
 impl Groups {
     /// Rows of each group that carry the same.
     #[must_use]
-    pub fn alike(&self, measurements: &[&Measurement]) -> Vec<Vec<usize>> {
+    pub(crate) fn alike(&self, measurements: &[&Measurement]) -> Vec<Vec<usize>> {
         let mut units: Vec<Vec<usize>> = Vec::new();
         for rows in &self.rows {
             let first = units.len();
@@ -53,7 +54,7 @@ impl Groups {
 
 /// Groups `measurements` by configuration.
 #[must_use]
-pub fn groups(measurements: &[&Measurement], settings: &Noise) -> Groups {
+pub(crate) fn groups(measurements: &[&Measurement], settings: &Noise) -> Groups {
     let total = measurements.len();
     let mut by_first: Vec<usize> = (0..total).collect();
     let first = |row: usize| measurements[row].joints.first().copied().unwrap_or(0.0);
@@ -98,7 +99,7 @@ pub fn groups(measurements: &[&Measurement], settings: &Noise) -> Groups {
 /// that disagree by far do not count. Readings between which the arm moved come first; where there are too few, those between which
 /// it did not.
 #[must_use]
-pub fn repeats(measurements: &[&Measurement], groups: &Groups, settings: &Noise) -> Option<Repeats> {
+pub(crate) fn repeats(measurements: &[&Measurement], groups: &Groups, settings: &Noise) -> Option<Repeats> {
     let mut in_time: Vec<usize> = (0..measurements.len()).collect();
     in_time.sort_by(|a, b| measurements[*a].time_s.total_cmp(&measurements[*b].time_s).then(a.cmp(b)));
     let mut place = vec![0; measurements.len()];
@@ -195,7 +196,13 @@ fn contrasts(points: &[Vector3<f64>]) -> Vec<f64> {
 /// Weights of rows whose residuals (of all `equations`, whitened) are alike within a group: a group of `n` rows with the
 /// intraclass correlation ρ tells as much as `n / (1 + (n − 1) ρ)` independent ones. `good`: rows that are no outliers. Also ρ.
 #[must_use]
-pub fn weights(groups: &Groups, residual: &[f64], equations: &Equations, good: &[bool], settings: &Noise) -> (Vec<f64>, f64) {
+pub(crate) fn weights(
+    groups: &Groups,
+    residual: &[f64],
+    equations: &Equations,
+    good: &[bool],
+    settings: &Noise,
+) -> (Vec<f64>, f64) {
     // What was read of a component of the pose.
     let of = |row: usize, component: usize| {
         let at = equations.of(row).find(|equation| equations.component(*equation) == component);
@@ -227,7 +234,7 @@ pub fn weights(groups: &Groups, residual: &[f64], equations: &Equations, good: &
         return (vec![1.0; groups.of.len()], 0.0);
     }
     let correlation = if degrees_of_freedom < settings.pairs || all <= 0.0 {
-        0.5
+        settings.few_pairs_correlation
     } else {
         (1.0 - (within / of_within) / (all / of_all)).clamp(0.0, 1.0)
     };

@@ -21,31 +21,31 @@ use crate::measurement::Measurement;
 
 /// What one fold says.
 #[derive(Clone, Debug)]
-pub struct Fold {
+pub(crate) struct Fold {
     /// What it is called ([`Scheme::names`]).
-    pub name: String,
+    pub(crate) name: String,
     /// Rows.
-    pub rows: usize,
+    pub(crate) rows: usize,
     /// Sum of squares of the held-out positions, m²: base and target only.
-    pub nominal: f64,
+    pub(crate) nominal: f64,
     /// With all geometry.
-    pub geometry: f64,
+    pub(crate) geometry: f64,
     /// With all geometry and the first 1, 2, … effects of the best set of all readings, each as large as the other folds say.
-    pub with_best: Vec<f64>,
+    pub(crate) with_best: Vec<f64>,
     /// With all geometry and what was chosen without the fold, as much of it as is used.
-    pub explained: f64,
+    pub(crate) explained: f64,
     /// With the first 1, 2, … of what was chosen without the fold.
-    pub with_chosen: Vec<f64>,
+    pub(crate) with_chosen: Vec<f64>,
     /// What was chosen without the fold, in the order added.
-    pub chosen: Vec<usize>,
+    pub(crate) chosen: Vec<usize>,
     /// How many of these are used.
-    pub used: usize,
+    pub(crate) used: usize,
 }
 
 impl Fold {
     /// With the first `count` effects of the best set of all readings.
     #[must_use]
-    pub fn with(&self, count: usize) -> f64 {
+    pub(crate) fn with(&self, count: usize) -> f64 {
         match self.with_best.len().min(count) {
             0 => self.geometry,
             count => self.with_best[count - 1],
@@ -62,17 +62,17 @@ impl Fold {
 
 /// What leaving out in one way says.
 #[derive(Clone, Debug)]
-pub struct HeldOut {
+pub(crate) struct HeldOut {
     /// What the rows of a fold share.
-    pub by: Block,
+    pub(crate) by: Block,
     /// Fold by fold.
-    pub folds: Vec<Fold>,
+    pub(crate) folds: Vec<Fold>,
 }
 
 impl HeldOut {
     /// Mean square of the held-out positions with the effects that are used, m².
     #[must_use]
-    pub fn explained(&self) -> f64 {
+    pub(crate) fn explained(&self) -> f64 {
         let rows: usize = self.folds.iter().map(|fold| fold.rows).sum();
         self.folds.iter().map(|fold| fold.explained).sum::<f64>() / rows.max(1) as f64
     }
@@ -80,15 +80,15 @@ impl HeldOut {
 
 /// A way of leaving rows out.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Scheme {
+pub(crate) struct Scheme {
     /// What the rows of a fold share.
-    pub by: Block,
+    pub(crate) by: Block,
     /// Fold of each row.
-    pub fold: Vec<usize>,
+    pub(crate) fold: Vec<usize>,
     /// Number of folds.
-    pub folds: usize,
+    pub(crate) folds: usize,
     /// What each fold is called: the payload or the session; empty for regions.
-    pub names: Vec<String>,
+    pub(crate) names: Vec<String>,
 }
 
 /// What the rows of a fold share.
@@ -106,9 +106,15 @@ pub enum Block {
 /// The ways of leaving out that `measurements` allow: by region first, then by payload and by session where there are several. Rows of
 /// a configuration stay together in a region.
 #[must_use]
-pub fn schemes(measurements: &[&Measurement], targets: &[Vector3<f64>], groups: &Groups, folds: usize) -> Vec<Scheme> {
+pub(crate) fn schemes(
+    measurements: &[&Measurement],
+    targets: &[Vector3<f64>],
+    groups: &Groups,
+    settings: &settings::Validation,
+) -> Vec<Scheme> {
+    let folds = settings.folds;
     let points: Vec<Vector3<f64>> = groups.rows.iter().map(|rows| targets[rows[0]]).collect();
-    let most = folds.min(points.len() / 4).max(2);
+    let most = folds.min(points.len() / settings.configurations).max(2);
     let of_group = regions(&points, most);
     let by_region = groups.of.iter().map(|group| of_group[*group]).collect();
     let mut schemes = vec![Scheme::new(Block::Region, by_region, &[], folds)];
@@ -127,7 +133,7 @@ pub fn schemes(measurements: &[&Measurement], targets: &[Vector3<f64>], groups: 
     let sessions: Vec<String> = sessions.iter().map(|name| (*name).to_owned()).collect();
     for (by, fold, names) in [(Block::Payload, at_payload, payloads), (Block::Session, at_session, sessions)] {
         let scheme = Scheme::new(by, fold, &names, folds);
-        if (0..scheme.folds).any(|out| scheme.leaves_enough(out)) && scheme.folds > 1 {
+        if (0..scheme.folds).any(|out| scheme.leaves_enough(out, settings.left)) && scheme.folds > 1 {
             schemes.push(scheme);
         }
     }
@@ -135,9 +141,9 @@ pub fn schemes(measurements: &[&Measurement], targets: &[Vector3<f64>], groups: 
 }
 
 impl Scheme {
-    /// Whether a quarter of the rows is left without fold `out`: less would hardly tell where the arm stands.
-    fn leaves_enough(&self, out: usize) -> bool {
-        4 * self.fold.iter().filter(|fold| **fold != out).count() >= self.fold.len()
+    /// Whether the share `least` of the rows is left without fold `out`.
+    fn leaves_enough(&self, out: usize, least: f64) -> bool {
+        self.fold.iter().filter(|fold| **fold != out).count() as f64 >= least * self.fold.len() as f64
     }
 
     /// `names`: of what each fold holds; those beyond the number of folds share one.
@@ -155,9 +161,12 @@ impl Scheme {
     }
 }
 
+/// Rounds of k-means: hundreds of points settle in fewer.
+const ROUNDS: usize = 30;
+
 /// Folds blocked by region: k-means of `points` from those farthest from each other.
 #[must_use]
-pub fn regions(points: &[Vector3<f64>], folds: usize) -> Vec<usize> {
+pub(crate) fn regions(points: &[Vector3<f64>], folds: usize) -> Vec<usize> {
     let centre = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
     let far = |point: &Vector3<f64>, centres: &[Vector3<f64>]| {
         centres.iter().map(|centre| (point - centre).norm_squared()).fold(f64::INFINITY, f64::min)
@@ -171,7 +180,7 @@ pub fn regions(points: &[Vector3<f64>], folds: usize) -> Vec<usize> {
         }
     }
     let mut fold = vec![0; points.len()];
-    for _ in 0..30 {
+    for _ in 0..ROUNDS {
         for (point, fold) in points.iter().zip(&mut fold) {
             let distance = |at: &usize| (point - centres[*at]).norm_squared();
             *fold = (0..centres.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0);
@@ -188,27 +197,27 @@ pub fn regions(points: &[Vector3<f64>], folds: usize) -> Vec<usize> {
 }
 
 /// What is left out and chosen anew.
-pub struct Validation<'a> {
+pub(crate) struct Validation<'a> {
     /// The readings.
-    pub linear: &'a Linear<'a>,
+    pub(crate) linear: &'a Linear<'a>,
     /// What is known of the noise.
-    pub noise: NoisePrior,
+    pub(crate) noise: NoisePrior,
     /// Rows that are no outliers; only they are counted.
-    pub good: &'a [bool],
+    pub(crate) good: &'a [bool],
     /// The best set of all readings.
-    pub best: &'a [(usize, usize)],
+    pub(crate) best: &'a [(usize, usize)],
     /// How it is searched, and what counts.
-    pub settings: &'a Settings,
+    pub(crate) settings: &'a Settings,
 }
 
 impl Validation<'_> {
     /// Leaves out each fold of `scheme` in turn; `products` are by its folds.
     #[must_use]
-    pub fn run(&self, scheme: &Scheme, products: &Products) -> HeldOut {
+    pub(crate) fn run(&self, scheme: &Scheme, products: &Products) -> HeldOut {
         use rayon::prelude::*;
         let mut folds: Vec<Fold> = (0..scheme.folds)
             .into_par_iter()
-            .filter(|number| scheme.leaves_enough(*number))
+            .filter(|number| scheme.leaves_enough(*number, self.settings.validation.left))
             .filter_map(|number| {
                 let rows: Vec<usize> =
                     (0..self.good.len()).filter(|row| scheme.fold[*row] == number && self.good[*row]).collect();

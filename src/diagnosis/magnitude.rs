@@ -1,11 +1,14 @@
 //! How large a named effect is, with its interval.
 
 use super::Analysis;
-use super::evidence::{Fit, one_signed};
+use super::evidence::Fit;
 use super::outcome::Magnitude;
 use super::settings::{Decision, SCALES};
 use crate::effects::{Kind, Load};
 use crate::numerics::distribution::{NORMAL_95, student_quantile};
+
+/// Unit of what load drives where no masses are known.
+const RELATIVE: &str = "relative (no masses)";
 
 /// The best set fitted with the widest prior there is, so that it pulls next to nothing: what magnitudes and all else that effects have
 /// are told from.
@@ -29,14 +32,13 @@ pub(super) fn magnitude(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -
     let quantile = student_quantile(0.975, degrees_of_freedom).unwrap_or(NORMAL_95);
     let name = of.kind.map_or("", Kind::unit).to_owned();
     let load = is_driven_by_load(of.kind) && !analysis.linear.rows.mechanism.masses_known;
-    let name = if load { "relative (no masses)".to_owned() } else { name };
-    let model = model_sigma(of.kind, &analysis.options.settings.decision);
+    let name = if load { RELATIVE.to_owned() } else { name };
+    let settings = &analysis.options.settings.decision;
+    let model = model_sigma(of.kind, settings);
     if width == 1 {
         let (mean, sigma) = (value(0), libm::hypot(libm::sqrt(covariance(0, 0)), model * value(0).abs()));
         let interval = [mean - quantile * sigma, mean + quantile * sigma];
-        // What has no sign is told by its size.
-        let signed = one_signed(of);
-        let flip = !signed && mean < 0.0 && of.kind == Some(Kind::Backlash);
+        let flip = mean < 0.0 && of.kind.is_some_and(|kind| kind.descriptor().sign_apart);
         let interval = if flip { [-interval[1], -interval[0]] } else { interval };
         return Magnitude { value: if flip { -mean } else { mean }, unit: name, ci95: interval };
     }
@@ -50,7 +52,7 @@ pub(super) fn magnitude(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -
         }
     }
     // The length of a noisy vector is too long by what is across it.
-    let true_length = libm::sqrt((length * length - (trace - along)).max(0.05 * length * length));
+    let true_length = libm::sqrt((length * length - (trace - along)).max(settings.shortened * length * length));
     let half = quantile * libm::hypot(libm::sqrt(along), model * length);
     Magnitude { value: true_length, unit: name, ci95: [(true_length - half).max(0.0), true_length + half] }
 }
@@ -63,4 +65,75 @@ fn model_sigma(kind: Option<Kind>, settings: &Decision) -> f64 {
 
 fn is_driven_by_load(kind: Option<Kind>) -> bool {
     kind.is_some_and(|kind| kind.descriptor().load == Load::Drives)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::*;
+    use crate::diagnosis::tests::{hypothesis, with_analysis};
+    use crate::effects::signature::shape::Shape;
+    use crate::seed::stream;
+
+    /// A fit in which `hypothesis` has the coefficients `values` (SI) with independent errors of `sigma`.
+    fn fit(analysis: &Analysis<'_>, hypothesis: usize, values: &[f64], sigma: f64) -> Fit {
+        let candidates = analysis.evidence.candidates;
+        let size = |at: usize| candidates.unit[hypothesis] * candidates.hypotheses[hypothesis].spread[at];
+        let variances = DVector::from_fn(values.len(), |at, _| (sigma / size(at)) * (sigma / size(at)));
+        Fit {
+            columns: candidates.columns(hypothesis).collect(),
+            coefficients: DVector::from_fn(values.len(), |at, _| values[at] / size(at)),
+            covariance: DMatrix::from_diagonal(&variances),
+            noise: 1.0,
+        }
+    }
+
+    #[test]
+    fn a_width_is_positive_and_a_stiffness_keeps_its_sign() {
+        with_analysis(
+            |_, _, _, _, _| 0.0,
+            |analysis| {
+                let of = |kind: Kind, value: f64| {
+                    let number = hypothesis(&analysis, Some(kind), 3);
+                    magnitude(&analysis, &fit(&analysis, number, &[value], 1e-5), number)
+                };
+                let width = of(Kind::Backlash, -2e-4);
+                assert!((width.value - 2e-4).abs() < 1e-12);
+                assert_eq!(width, of(Kind::Backlash, 2e-4));
+                // About two sigmas to either side, and a little for what is not known of the signature.
+                let half = 0.5 * (width.ci95[1] - width.ci95[0]);
+                assert!((1.96e-5..2.05e-5).contains(&half) && (width.ci95[0] + half - 2e-4).abs() < 1e-12, "{width:?}");
+                assert!(of(Kind::JointCompliance, -3e-5).value < 0.0);
+            },
+        );
+    }
+
+    /// Noise makes a vector longer: draws about a known one tell whether what is taken off is right, and how often the interval has it.
+    #[test]
+    fn the_length_of_a_noisy_vector_is_not_too_long() {
+        with_analysis(
+            |_, _, _, _, _| 0.0,
+            |analysis| {
+                let is = |of: &Shape| *of == Shape::Harmonic { joint: 2, order: 1.0 };
+                let of_kind = |number: &usize| {
+                    let of = &analysis.evidence.candidates.hypotheses[*number];
+                    of.kind == Some(Kind::JointEccentricity) && is(&of.shape)
+                };
+                let number = (0..analysis.evidence.candidates.hypotheses.len()).find(of_kind).unwrap();
+                let (truth, sigma, count) = (5e-5, 0.8e-5, 10_000);
+                let mut draws = stream(3, "test/lengths");
+                let (mut plain, mut told, mut inside) = (0.0, 0.0, 0);
+                for _ in 0..count {
+                    let values = [truth * 0.6, truth * 0.8].map(|value| value + sigma * draws.normal());
+                    let found = magnitude(&analysis, &fit(&analysis, number, &values, sigma), number);
+                    plain += values[0].hypot(values[1]) / f64::from(count);
+                    told += found.value / f64::from(count);
+                    inside += i32::from(found.ci95[0] <= truth && truth <= found.ci95[1]);
+                }
+                assert!(plain / truth - 1.0 > 0.008 && (told / truth - 1.0).abs() < 0.006, "{plain} {told}");
+                assert!((0.94..0.965).contains(&(f64::from(inside) / f64::from(count))), "{inside}");
+            },
+        );
+    }
 }

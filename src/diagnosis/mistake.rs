@@ -7,14 +7,14 @@ use crate::arm::frames::registration;
 use crate::effects::signature::posture::Mechanism;
 use crate::measurement::Measurement;
 
-/// A mistake is worth naming if mending it leaves less than this share.
-const MENDED: f64 = 0.2;
-/// Rounds of fitting base and target in turn.
+/// Rounds of fitting base and target in turn: each takes up a part of what the other leaves, and few do for a misfit of millimetres.
 const ROUNDS: usize = 20;
+/// Keeps the target where nothing tells it, next to sums over readings of about one.
+const DAMPING: f64 = 1e-9;
 
-/// A sentence about what to look at: the mistake that explains most of the misfit, if one does.
+/// A sentence about what to look at: the mistake that explains most of the misfit, if one leaves less of it than the share `mended`.
 #[must_use]
-pub fn hint(arm: &Arm, measurements: &[&Measurement]) -> String {
+pub(crate) fn hint(arm: &Arm, measurements: &[&Measurement], mended: f64) -> String {
     let mechanism = Mechanism::new(arm);
     // What lacks a coordinate cannot be registered.
     let whole: Vec<&&Measurement> = measurements.iter().filter(|row| row.unread == [false; 3]).collect();
@@ -65,7 +65,7 @@ pub fn hint(arm: &Arm, measurements: &[&Measurement]) -> String {
         .filter(|joint| joints.iter().all(|row| row[*joint] == joints[0][*joint]))
         .map(|joint| (joint + 1).to_string())
         .collect();
-    if let Some((left, said)) = best.filter(|(left, _)| *left < MENDED * as_is) {
+    if let Some((left, said)) = best.filter(|(left, _)| *left < mended * as_is) {
         return format!("It would be {:.1} mm (base and target fitted) if {said}", left * 1e3);
     }
     if !frozen.is_empty() {
@@ -93,7 +93,7 @@ fn misfit(mechanism: &Mechanism, joints: &[Vec<f64>], points: &[Vector3<f64>]) -
             return f64::INFINITY;
         };
         // The target, given where the base stands.
-        let (mut normal, mut right) = (Matrix3::identity() * 1e-9, Vector3::zeros());
+        let (mut normal, mut right) = (Matrix3::identity() * DAMPING, Vector3::zeros());
         let mut squares = 0.0;
         for ((tool, axes), point) in postures.iter().zip(points) {
             let in_root = base.inverse_transform_vector(&(point - base.translation.vector));

@@ -1,45 +1,50 @@
 //! From measurements to causes: what geometry leaves, which effects explain it with what probability, how far that goes on poses
 //! that were not used, what could not have been seen, and what remains unknown.
 //!
-//! Data ([`groups`], [`conditions`]) → a linear problem about the fitted geometry and the effects found so far ([`rows`], `linear`), made
-//! again until nothing changes → sets of effects with their probabilities, for which inner products suffice ([`products`], [`evidence`],
-//! [`search`]) → what they are worth on readings that were not used ([`held_out`]) → what is said ([`outcome`]).
+//! Data (`groups`, `conditions`) → a linear problem about the fitted geometry and the effects found so far (`rows`, `linear`), made
+//! again until nothing changes → sets of effects with their probabilities, for which inner products suffice (`products`, `evidence`,
+//! `search`) → what they are worth on readings that were not used (`held_out`) → what that comes to ([`conclusion`]), which
+//! [`crate::report::wording`] puts into words ([`outcome`]).
 
 mod advice;
 mod candidates;
 mod claims;
-pub mod conditions;
+pub mod conclusion;
+pub(crate) mod conditions;
 mod confusion;
 pub(crate) mod deflection;
 mod detectability;
-pub mod evidence;
+mod evidence;
 mod gap;
-pub mod groups;
-pub mod held_out;
+mod groups;
+pub(crate) mod held_out;
 mod linear;
 mod magnitude;
 mod misfit;
-pub mod mistake;
+mod mistake;
 mod naming;
 mod notes;
-pub mod open_set;
+mod open_set;
 pub mod outcome;
-pub mod outliers;
+mod outliers;
 pub(crate) mod parameters;
-pub mod power;
-pub mod products;
+mod power;
+mod products;
 mod ripple;
-pub mod rows;
-pub mod scatter;
-pub mod search;
-mod sentence;
+pub(crate) mod rows;
+mod scatter;
+mod search;
 pub mod settings;
 #[cfg(test)]
 pub(crate) mod tests;
 mod unknown;
 mod verdict;
-pub mod waterfall;
+pub(crate) mod waterfall;
 mod weights;
+
+pub use evidence::Extension;
+pub use held_out::Block;
+pub use rows::DiagnosisError;
 
 use nalgebra::DVector;
 
@@ -50,16 +55,17 @@ use crate::effects::{Kind, Location};
 use crate::identification::geometry::GeometryError;
 use crate::measurement::{Measurement, Sensor};
 use candidates::{candidates, weigh};
+use conclusion::Conclusion;
 use conditions::Conditions;
 use deflection::{Loads, Present, present};
-use evidence::{Candidates, Evidence, Extension, NoisePrior};
+use evidence::{Candidates, Evidence, NoisePrior};
 use groups::{Groups, Repeats};
-use held_out::{Block, HeldOut, Scheme, Validation};
+use held_out::{HeldOut, Scheme, Validation};
 use linear::Linear;
-use outcome::{Diagnosis, NoiseSource};
+use outcome::NoiseSource;
 use products::{Marginal, Products};
 use ripple::Ripple;
-use rows::{DiagnosisError, Readings, Rows};
+use rows::{Readings, Rows};
 use scatter::Scatter;
 use search::{Found, climb};
 use settings::Settings;
@@ -262,7 +268,7 @@ impl Pass {
         let (conditions, displaced) =
             conditions::conditions(measurements, &rows, &state.present, state.loads, state.upright.as_deref(), &settings.model);
         let mut candidates = data.options.candidates(&rows, &conditions, &state.ripples);
-        let scheme = held_out::schemes(measurements, &rows.targets, &data.groups, settings.validation.folds).swap_remove(0);
+        let scheme = held_out::schemes(measurements, &rows.targets, &data.groups, &settings.validation).swap_remove(0);
         // The effects found so far are taken out as large as they are on the arm as it is fitted now, and put back along their signatures.
         let mut total = rows.residual.clone();
         for (row, now) in displaced.iter().enumerate() {
@@ -352,7 +358,7 @@ impl Pass {
     }
 }
 
-/// What was found, before it is put into words.
+/// What was found, before it is decided what that comes to.
 pub(crate) struct Analysis<'a> {
     pub(crate) linear: &'a Linear<'a>,
     pub(crate) conditions: &'a Conditions,
@@ -384,7 +390,7 @@ impl Analysis<'_> {
     }
 }
 
-/// Diagnoses `measurements` of `arm`, read by `sensor`.
+/// Diagnoses `measurements` of `arm`, read by `sensor`. [`crate::report::wording::diagnosis`] puts what it comes to into words.
 ///
 /// # Errors
 /// If the measurements cannot tell where the arm stands, or are not this robot's.
@@ -393,7 +399,7 @@ pub fn diagnose(
     sensor: &Sensor,
     measurements: &[&Measurement],
     options: &Options,
-) -> Result<Diagnosis, DiagnosisError> {
+) -> Result<Conclusion, DiagnosisError> {
     let settings = &options.settings;
     settings.check()?;
     let data = Data::new(arm, sensor, measurements, options);
@@ -407,7 +413,7 @@ pub fn diagnose(
     let outliers = outliers_of(&data, &pass, &found);
     let good: Vec<bool> = (0..measurements.len()).map(|row| !outliers.rows.contains(&row)).collect();
     let validation = Validation { linear: &linear, noise: data.noise, good: &good, best: &found.best, settings };
-    let held_out: Vec<HeldOut> = held_out::schemes(measurements, &pass.rows.targets, &data.groups, settings.validation.folds)
+    let held_out: Vec<HeldOut> = held_out::schemes(measurements, &pass.rows.targets, &data.groups, &settings.validation)
         .iter()
         .map(|scheme| match scheme.by {
             Block::Region => validation.run(scheme, &pass.products),
@@ -444,7 +450,7 @@ pub fn diagnose(
         correlation: (data.groups.rows.len() < measurements.len()).then_some(pass.weighed.correlation),
         options,
     };
-    Ok(verdict::put(&analysis))
+    Ok(verdict::conclude(&analysis))
 }
 
 /// Fits around what is found until nothing changes: signatures are those of the fitted arm, readings that are far off from the best model
@@ -459,7 +465,7 @@ fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
     let mut plain: Option<(f64, State)> = None;
     for number in 0.. {
         let mut pass = Pass::new(data, &state, number)?;
-        if number < settings.model.choosing + 2 && pass.loads_matter_m > settings.model.loads_matter * sigma_m {
+        if number < settings.model.loads_passes && pass.loads_matter_m > settings.model.loads_matter * sigma_m {
             let other = State { loads: state.loads.other(), ..state.clone() };
             let otherwise = Pass::new(data, &other, number)?;
             if otherwise.log_likelihood > pass.log_likelihood {
@@ -507,7 +513,7 @@ fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
             let validation = Validation { linear: &linear, noise: data.noise, good: &good, best: &[], settings };
             validation.run(&pass.scheme, &pass.products).explained()
         };
-        if let Some(scatter) = looked.filter(|scatter| !scatter::alike(scatter, &state.scatter)) {
+        if let Some(scatter) = looked.filter(|scatter| !scatter::alike(scatter, &state.scatter, &settings.scatter)) {
             if state.scatter.is_empty() && plain.is_none() {
                 plain = Some((held_out(true), state.clone()));
             }
@@ -542,7 +548,7 @@ fn outliers_of(data: &Data<'_>, pass: &Pass, found: &Found) -> outliers::Outlier
     };
     let (sure, sure_counts): (Vec<f64>, Vec<usize>) =
         (0..squares.len()).filter(seated).map(|row| (squares[row], counts[row])).unzip();
-    if sure.len() < squares.len() && 2 * sure.len() >= data.measurements.len() {
+    if sure.len() < squares.len() && sure.len() as f64 >= settings.decided * data.measurements.len() as f64 {
         let far_off = std::mem::take(&mut outliers.rows);
         outliers = outliers::Outliers { rows: far_off, ..outliers::look(&sure, &sure_counts, settings) };
     }

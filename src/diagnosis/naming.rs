@@ -74,6 +74,63 @@ fn outliers(analysis: &Analysis<'_>, closing: &Closing<'_>, unknown: bool) -> Op
         held_out_rms_after_m: closing.explained(),
         gap_closed: None,
         folds: [0, closing.folds.len()],
-        detail: format!("noise about {} times that of the other readings", outliers.factor),
+        detail: String::new(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::held_out::{Block, HeldOut};
+    use crate::diagnosis::outliers::Outliers;
+    use crate::diagnosis::scatter::Scatter;
+    use crate::diagnosis::search::Found;
+    use crate::diagnosis::tests::{SIGMA, belief, fold_of, with_analysis};
+
+    #[test]
+    fn what_is_probable_is_named_with_the_folds_that_choose_it() {
+        let play = |_: &crate::arm::Arm, _: &[f64], approach: &[i8], joint: usize, _: f64| {
+            if joint == 2 { 2e-4 * f64::from(approach[2]) } else { 0.0 }
+        };
+        with_analysis(play, |mut analysis| {
+            let sure = belief(&analysis, Some(Kind::Backlash), 3, 0.9);
+            let unsure = belief(&analysis, Some(Kind::JointCompliance), 4, 0.4);
+            let best = vec![(unsure.hypothesis, 1), (sure.hypothesis, 1)];
+            analysis.found = Found { best, claims: vec![sure, unsure], ..Found::default() };
+            let fold = |chosen: Vec<usize>| fold_of([1e-6, 1e-7, 1e-8], &[9e-8, 1e-8], chosen);
+            let [this, other] = [sure.hypothesis, unsure.hypothesis];
+            let chosen = [vec![this], vec![other, this], vec![other], vec![this], vec![]];
+            analysis.held_out = vec![HeldOut { by: Block::Region, folds: chosen.into_iter().map(fold).collect() }];
+            let named = name(&analysis, &Closing::new(&analysis, SIGMA), false);
+            assert_eq!(named.of_member, [None, Some(0)]);
+            let [effect] = &named.effects[..] else { panic!("{:?}", named.effects) };
+            assert_eq!((effect.kind, effect.location.index, effect.folds), (Kind::Backlash, Some(3), [3, 5]));
+            assert!((effect.magnitude.value / 4e-4 - 1.0).abs() < 0.1, "{:?}", effect.magnitude);
+            // It is the second member: ten readings of a fold have 9e-8 m² before it and 1e-8 after.
+            assert!((effect.held_out_rms_before_m - 9e-9_f64.sqrt()).abs() < 1e-12);
+            assert!((effect.held_out_rms_after_m - 1e-9_f64.sqrt()).abs() < 1e-12);
+        });
+    }
+
+    #[test]
+    fn readings_far_off_are_named_where_nothing_else_has_tails() {
+        with_analysis(
+            |_, _, _, _, _| 0.0,
+            |mut analysis| {
+                let far =
+                    |factor: f64| Outliers { probability: 0.9, share: 0.05, share_ci95: [0.02, 0.1], factor, rows: vec![1] };
+                analysis.outliers = far(6.0);
+                let named = |analysis: &Analysis<'_>, unknown: bool| {
+                    let effects = name(analysis, &Closing::new(analysis, SIGMA), unknown).effects;
+                    effects.iter().map(|effect| (effect.kind, effect.parameters.factor)).collect::<Vec<_>>()
+                };
+                assert_eq!(named(&analysis, false), [(Kind::MeasurementOutliers, Some(6.0))]);
+                assert!(named(&analysis, true).is_empty());
+                analysis.outliers = far(9.0);
+                assert_eq!(named(&analysis, true).len(), 1);
+                analysis.scatter = vec![Scatter { joint: 0, sigma: 1e-4, log_odds: 5.0 }];
+                assert!(named(&analysis, false).is_empty());
+            },
+        );
+    }
 }

@@ -3,6 +3,7 @@
 
 use nalgebra::Vector3;
 
+use super::conclusion::{Trend, Variable};
 use super::conditions::Conditions;
 use super::outcome::Map;
 use crate::effects::signature::shape::Reading;
@@ -10,18 +11,18 @@ use crate::seed::stream;
 
 /// What the tests say.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Structure {
+pub(crate) struct Structure {
     /// Of there being none, the best of all tests accounted for.
-    pub p_value: f64,
-    /// Where the strongest shows.
-    pub r#where: String,
+    pub(crate) p_value: f64,
+    /// The strongest.
+    pub(crate) strongest: Trend,
     /// By how many standard deviations it stands out.
-    pub strength: f64,
+    pub(crate) strength: f64,
 }
 
 /// Neighbours in a variable, and what they say.
 struct Order {
-    name: String,
+    variable: Variable,
     /// Rows from the smallest value on.
     rows: Vec<usize>,
 }
@@ -29,21 +30,21 @@ struct Order {
 /// Orders of the readings `rows` of `conditions` by everything that was recorded; as places in `rows`.
 fn orders(conditions: &Conditions, rows: &[usize]) -> Vec<Order> {
     let readings: Vec<&Reading> = rows.iter().map(|row| &conditions.readings[*row]).collect();
-    let by = |name: String, value: &dyn Fn(usize) -> f64| {
+    let by = |variable: Variable, value: &dyn Fn(usize) -> f64| {
         let mut rows: Vec<usize> = (0..readings.len()).collect();
         rows.sort_by(|a, b| value(*a).total_cmp(&value(*b)).then(a.cmp(b)));
-        Order { name, rows }
+        Order { variable, rows }
     };
     let mut orders = Vec::new();
     for joint in 0..conditions.columns.travel.len() {
-        orders.push(by(format!("the angle of joint {}", joint + 1), &|row| readings[row].joints[joint]));
-        orders.push(by(format!("the torque of joint {}", joint + 1), &|row| readings[row].posture.torque(joint)));
+        orders.push(by(Variable::Angle(joint + 1), &|row| readings[row].joints[joint]));
+        orders.push(by(Variable::Torque(joint + 1), &|row| readings[row].posture.torque(joint)));
     }
     if conditions.columns.time {
-        orders.push(by("time".to_owned(), &|row| readings[row].share));
+        orders.push(by(Variable::Time, &|row| readings[row].share));
     }
     if conditions.columns.temperature {
-        orders.push(by("temperature".to_owned(), &|row| readings[row].rise_k[0]));
+        orders.push(by(Variable::Temperature, &|row| readings[row].rise_k[0]));
     }
     orders
 }
@@ -51,7 +52,12 @@ fn orders(conditions: &Conditions, rows: &[usize]) -> Vec<Order> {
 /// Tests `residual` (one vector per row, in sigmas times the root of the row's weight) for likeness of neighbours in every order. The
 /// rows of each of `units` count as one: readings of one configuration are alike without any structure between configurations.
 #[must_use]
-pub fn structure(conditions: &Conditions, residual: &[Vector3<f64>], units: &[Vec<usize>], permutations: usize) -> Structure {
+pub(crate) fn structure(
+    conditions: &Conditions,
+    residual: &[Vector3<f64>],
+    units: &[Vec<usize>],
+    permutations: usize,
+) -> Structure {
     let rows: Vec<usize> = units.iter().map(|unit| unit[0]).collect();
     let residual: Vec<Vector3<f64>> = units
         .iter()
@@ -112,18 +118,18 @@ pub fn structure(conditions: &Conditions, residual: &[Vector3<f64>], units: &[Ve
     let (at, strength) = strongest(&observed);
     let above = permuted.iter().filter(|values| strongest(values).1 >= strength).count();
     let per_order = 1 + joints;
-    let of = at % per_order;
-    let what = if of == 0 { "the residual".to_owned() } else { format!("the residual along joint {}", of) };
+    // The vector itself stands first.
+    let along = Some(at % per_order).filter(|joint| *joint > 0);
     Structure {
         p_value: (above + 1) as f64 / (permutations + 1) as f64,
-        r#where: format!("{what} follows {}", orders[at / per_order].name),
+        strongest: Trend { along, follows: orders[at / per_order].variable },
         strength,
     }
 }
 
 /// The mean residual (m) along each joint's motion by its angle, as an angle of the joint.
 #[must_use]
-pub fn maps(conditions: &Conditions, residual_m: &[Vector3<f64>], bins: usize) -> Vec<Map> {
+pub(crate) fn maps(conditions: &Conditions, residual_m: &[Vector3<f64>], bins: usize) -> Vec<Map> {
     let joints = conditions.columns.travel.len();
     (0..joints)
         .map(|joint| {

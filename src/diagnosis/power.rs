@@ -17,22 +17,31 @@ use crate::seed::stream;
 
 /// Columns of all that is looked at.
 const COLUMNS: usize = 64;
-/// Differences of log posterior beyond which a rival adds nothing.
+/// Differences of log posterior beyond which another member adds nothing.
 const NEGLIGIBLE: f64 = 9.0;
+/// λ between which the least magnitude is looked for first; where it is not, the search goes on from there.
+const FIRST: [f64; 2] = [12.0, 40.0];
+/// Doublings of the magnitude after which nothing would ever show, and tries after which less does not matter.
+const DOUBLINGS: usize = 14;
+const HALVINGS: usize = 20;
+/// Ratio between a magnitude that shows too rarely and one that shows often enough at which the search ends: draws tell no better.
+const EXACT: f64 = 1.01;
+/// Shares of the usual turn that come with a translation, drawn evenly.
+const TURNS: [f64; 2] = [0.2, 1.0];
 /// Log prior odds of what is not in play.
 const OUT_OF_PLAY: f64 = -6.0;
 
 /// The power of a claim.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Power {
+pub(crate) struct Power {
     /// Least magnitude, SI; `None` where nothing survives.
-    pub least: Option<f64>,
+    pub(crate) least: Option<f64>,
     /// Named hypothesis of another claim that is most alike, and how much (cosine squared).
-    pub alike: Option<(usize, f64)>,
+    pub(crate) alike: Option<(usize, f64)>,
 }
 
 /// Finds what a data set would show.
-pub struct Bench<'a> {
+pub(crate) struct Bench<'a> {
     settings: &'a Settings,
     candidates: &'a Candidates,
     marginal: &'a Marginal<'a>,
@@ -97,7 +106,7 @@ struct Draw {
 impl<'a> Bench<'a> {
     /// For data with this `evidence`, with a noise of mean square `noise` (in declared sigmas), and with the effects `found`, beside which everything else has to show.
     #[must_use]
-    pub fn new(evidence: &Evidence<'a>, noise: f64, found: &'a [(usize, usize)]) -> Bench<'a> {
+    pub(crate) fn new(evidence: &Evidence<'a>, noise: f64, found: &'a [(usize, usize)]) -> Bench<'a> {
         let Evidence { marginal, candidates, noise: prior, settings } = *evidence;
         let inverses = (0..candidates.hypotheses.len())
             .map(|hypothesis| {
@@ -117,7 +126,7 @@ impl<'a> Bench<'a> {
                 columns: std::array::from_fn(|_| stream.normal()),
                 rest: stream.normal(),
                 direction: std::array::from_fn(|_| stream.normal()),
-                turn: stream.uniform(0.2, 1.0),
+                turn: stream.uniform(TURNS[0], TURNS[1]),
             })
             .collect();
         Bench { settings, candidates, marginal, prior, noise: noise.max(1e-12), found, inverses, pool }
@@ -146,10 +155,10 @@ impl<'a> Bench<'a> {
 
     /// The power of the claim whose variants are `variants`, each as likely.
     #[must_use]
-    pub fn power(&self, variants: &[usize]) -> Power {
-        let shows = |variant: &usize| self.information(*variant) / self.noise >= 1e-8;
+    pub(crate) fn power(&self, variants: &[usize]) -> Power {
+        let shows = |variant: &usize| self.information(*variant) / self.noise >= self.settings.power.nothing;
         let seen: Vec<usize> = variants.iter().copied().filter(shows).collect();
-        if seen.is_empty() || 2 * seen.len() < variants.len() {
+        if seen.is_empty() || (seen.len() as f64) < self.settings.power.surviving * variants.len() as f64 {
             return Power { least: None, alike: None };
         }
         let count = seen.len().min(self.settings.power.truths);
@@ -190,8 +199,7 @@ impl<'a> Bench<'a> {
         if draws == 0 || mean <= 0.0 {
             return None;
         }
-        // λ of about 25 is usual.
-        let (mut low, mut high) = (libm::sqrt(12.0 * self.noise / mean), libm::sqrt(40.0 * self.noise / mean));
+        let (mut low, mut high) = (libm::sqrt(FIRST[0] * self.noise / mean), libm::sqrt(FIRST[1] * self.noise / mean));
         let (mut below, mut above) = (named(low, &never, &always), named(high, &never, &always));
         let mut tries = 0;
         while !enough(&above) {
@@ -199,7 +207,7 @@ impl<'a> Bench<'a> {
             high *= 2.0;
             above = named(high, &never, &always);
             tries += 1;
-            if tries > 14 {
+            if tries > DOUBLINGS {
                 return None;
             }
         }
@@ -208,11 +216,11 @@ impl<'a> Bench<'a> {
             low *= 0.5;
             below = named(low, &never, &always);
             tries += 1;
-            if tries > 20 {
+            if tries > HALVINGS {
                 return Some(high);
             }
         }
-        while high / low > 1.01 {
+        while high / low > EXACT {
             let middle = libm::sqrt(low * high);
             let between = named(middle, &below, &above);
             if enough(&between) {
@@ -249,7 +257,7 @@ impl<'a> Bench<'a> {
                 chosen.push(*other);
             }
         }
-        // What it claims comes first, so that rivals that are far behind it are passed over.
+        // What it claims comes first, so that others that are far behind it are passed over.
         chosen[1..].sort_by_key(|other| !variants.contains(other));
         let columns: Vec<usize> = chosen.iter().flat_map(|member| self.candidates.columns(*member)).collect();
         let size = columns.len();

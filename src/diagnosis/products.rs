@@ -15,7 +15,7 @@ use crate::numerics::gram;
 
 /// Inner products of `[geometry | signatures | residual]`, fold by fold.
 #[derive(Debug)]
-pub struct Products {
+pub(crate) struct Products {
     folds: Vec<Fold>,
     /// Whitened signatures, fold below fold.
     signatures: DMatrix<f64>,
@@ -95,7 +95,7 @@ impl Products {
     /// Of the signatures of `candidates` at `readings`, of the geometry of `rows`, and of `residual` (m and rad, as it is without any
     /// effect taken out). `fold`: of each row; there are `folds` of them.
     #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         rows: &Rows,
         readings: &[Reading],
         candidates: &Candidates,
@@ -108,7 +108,7 @@ impl Products {
 
     /// The same with each row counted `count` times: rows that stand for others.
     #[must_use]
-    pub fn counted(
+    pub(crate) fn counted(
         rows: &Rows,
         readings: &[Reading],
         candidates: &Candidates,
@@ -143,12 +143,6 @@ impl Products {
             })
             .collect();
         Products { folds, signatures, geometry: rows.jacobian.ncols(), columns, first_own, rows: RwLock::default() }
-    }
-
-    /// Number of folds.
-    #[must_use]
-    pub fn folds(&self) -> usize {
-        self.folds.len()
     }
 
     fn width(&self) -> usize {
@@ -243,13 +237,13 @@ impl Fold {
 /// What is known of the geometry before the readings: the fitted values over the sigmas of their priors (zero where free), and by how
 /// much those sigmas are too large (one: as they are).
 #[derive(Clone, Debug, PartialEq)]
-pub struct GeometryPrior {
+pub(crate) struct GeometryPrior {
     /// Fitted values over sigma.
-    pub offset: DVector<f64>,
+    pub(crate) offset: DVector<f64>,
     /// Which parameters are free.
-    pub free: Vec<bool>,
+    pub(crate) free: Vec<bool>,
     /// Sigma over that of the fit.
-    pub scale: f64,
+    pub(crate) scale: f64,
 }
 
 impl GeometryPrior {
@@ -259,14 +253,14 @@ impl GeometryPrior {
 
     /// The same with another scale.
     #[must_use]
-    pub fn scaled(&self, scale: f64) -> GeometryPrior {
+    pub(crate) fn scaled(&self, scale: f64) -> GeometryPrior {
         GeometryPrior { scale, ..self.clone() }
     }
 }
 
 /// What is left once the geometry has been fitted jointly: inner products of what survives of signatures and residual.
 #[derive(Debug)]
-pub struct Marginal<'a> {
+pub(crate) struct Marginal<'a> {
     products: &'a Products,
     left_out: Option<usize>,
     /// Of geometry with signatures and residual, the prior's pull taken off the residual's.
@@ -277,20 +271,20 @@ pub struct Marginal<'a> {
     normal: DMatrix<f64>,
     own: Vec<f64>,
     /// Of signatures with the residual.
-    pub with_residual: Vec<f64>,
+    pub(crate) with_residual: Vec<f64>,
     /// Of the residual with itself.
-    pub residual: f64,
+    pub(crate) residual: f64,
     /// Equations that the geometry leaves.
-    pub degrees_of_freedom: f64,
+    pub(crate) degrees_of_freedom: f64,
     /// Logarithm of the evidence's part that the geometry's prior decides: half the log determinant of prior precision over posterior's.
-    pub log_geometry: f64,
+    pub(crate) log_geometry: f64,
     rows: RwLock<BTreeMap<usize, Arc<Vec<f64>>>>,
 }
 
 impl<'a> Marginal<'a> {
     /// Of all rows, or of all but those of the fold `left_out`. `None` where the rows do not tell where the arm stands.
     #[must_use]
-    pub fn new(products: &'a Products, left_out: Option<usize>, prior: &GeometryPrior) -> Option<Marginal<'a>> {
+    pub(crate) fn new(products: &'a Products, left_out: Option<usize>, prior: &GeometryPrior) -> Option<Marginal<'a>> {
         let count = products.geometry;
         let folds: Vec<&Fold> =
             products.folds.iter().enumerate().filter(|(number, _)| Some(*number) != left_out).map(|(_, fold)| fold).collect();
@@ -349,7 +343,7 @@ impl<'a> Marginal<'a> {
 
     /// What survives of column `number` with every column.
     #[must_use]
-    pub fn row(&self, number: usize) -> Arc<Vec<f64>> {
+    pub(crate) fn row(&self, number: usize) -> Arc<Vec<f64>> {
         if let Ok(known) = self.rows.read()
             && let Some(row) = known.get(&number)
         {
@@ -382,26 +376,20 @@ impl<'a> Marginal<'a> {
 
     /// What survives of columns `i` and `j` of `hypothesis`, counted from its first.
     #[must_use]
-    pub fn own(&self, hypothesis: usize, i: usize, j: usize) -> f64 {
+    pub(crate) fn own(&self, hypothesis: usize, i: usize, j: usize) -> f64 {
         let width = self.products.columns[hypothesis].len();
         self.own[self.products.first_own[hypothesis] + i * width + j]
     }
 
     /// Information about a coefficient of one of all columns of `hypothesis`: the trace of its block.
     #[must_use]
-    pub fn information(&self, hypothesis: usize) -> f64 {
+    pub(crate) fn information(&self, hypothesis: usize) -> f64 {
         (0..self.products.columns[hypothesis].len()).map(|i| self.own(hypothesis, i, i)).sum()
-    }
-
-    /// Number of columns of all signatures.
-    #[must_use]
-    pub fn width(&self) -> usize {
-        self.products.width()
     }
 
     /// The geometry's change beside signatures with these coefficients (column and value).
     #[must_use]
-    pub fn geometry(&self, coefficients: &[(usize, f64)]) -> DVector<f64> {
+    pub(crate) fn geometry(&self, coefficients: &[(usize, f64)]) -> DVector<f64> {
         let last = self.absorbed.ncols() - 1;
         let mut change = self.absorbed.column(last).into_owned();
         for (number, value) in coefficients {
@@ -412,13 +400,13 @@ impl<'a> Marginal<'a> {
 
     /// The geometry's change per unit of column `number`.
     #[must_use]
-    pub fn absorbed(&self, number: usize) -> DVector<f64> {
+    pub(crate) fn absorbed(&self, number: usize) -> DVector<f64> {
         self.absorbed.column(number).into_owned()
     }
 
     /// The geometry's change where base and target are fitted and all else is nominal.
     #[must_use]
-    pub fn free_only(&self, prior: &GeometryPrior) -> Option<DVector<f64>> {
+    pub(crate) fn free_only(&self, prior: &GeometryPrior) -> Option<DVector<f64>> {
         let free: Vec<usize> = (0..self.products.geometry).filter(|parameter| prior.free[*parameter]).collect();
         let last = self.mixed.ncols() - 1;
         let normal = DMatrix::from_fn(free.len(), free.len(), |i, j| self.normal[(free[i], free[j])]);

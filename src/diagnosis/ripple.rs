@@ -9,6 +9,9 @@ use crate::effects::signature::library::RIPPLES;
 use crate::effects::signature::shape::Shape;
 use crate::numerics::gram;
 
+/// Sine squared of the angle between two columns below which they are one thing: products of thousands of readings are no more exact.
+const SINGULAR: f64 = 1e-6;
+
 /// A ripple found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Ripple {
@@ -78,7 +81,7 @@ pub(super) fn scan(
                 let (aa, ab, bb) = (product(0, 0), product(0, 1), product(1, 1));
                 let determinant = aa * bb - ab * ab;
                 // Where both are nearly one thing, or geometry, there is no ripple to be seen.
-                if determinant <= 1e-6 * aa * bb || aa <= 0.0 || bb <= 0.0 {
+                if determinant <= SINGULAR * aa * bb || aa <= 0.0 || bb <= 0.0 {
                     return 0.0;
                 }
                 (bb * right[0] * right[0] - 2.0 * ab * right[0] * right[1] + aa * right[1] * right[1]) / determinant / level

@@ -9,7 +9,6 @@ use super::mistake;
 use super::scatter::Scatter;
 use super::settings::Model;
 use crate::arm::Arm;
-use crate::arm::frames::Pose;
 use crate::effects::signature::posture::{Mechanism, Posture};
 use crate::effects::signature::shape::Displacement;
 use crate::identification::geometry::{self, GeometryError};
@@ -51,40 +50,34 @@ pub enum DiagnosisError {
 
 /// The fitted geometry and what it leaves.
 #[derive(Clone, Debug)]
-pub struct Rows {
+pub(crate) struct Rows {
     /// Fitted arm.
-    pub mechanism: Mechanism,
-    /// Where it stands, by session; one for all where they agree.
-    pub measurement_from_root: Vec<Pose>,
-    /// Session of each row, as far as they have bases of their own.
-    pub session: Vec<usize>,
+    pub(crate) mechanism: Mechanism,
     /// Arm in each row.
-    pub postures: Vec<Posture>,
+    pub(crate) postures: Vec<Posture>,
     /// Target in root of each row, m.
-    pub targets: Vec<Vector3<f64>>,
+    pub(crate) targets: Vec<Vector3<f64>>,
     /// What the rows tell.
-    pub equations: Equations,
+    pub(crate) equations: Equations,
     /// Residuals of the equations, m and rad.
-    pub residual: DVector<f64>,
+    pub(crate) residual: DVector<f64>,
     /// What makes the equations alike in noise.
-    pub whitening: Whitening,
+    pub(crate) whitening: Whitening,
     /// What each geometric parameter, scaled by its prior's sigma, does.
-    pub jacobian: DMatrix<f64>,
+    pub(crate) jacobian: DMatrix<f64>,
     /// The fitted parameters over the sigmas of their priors.
-    pub parameters: DVector<f64>,
+    pub(crate) parameters: DVector<f64>,
     /// Which parameters are free (base and target).
-    pub free: Vec<bool>,
-    /// Names of the targets.
-    pub targets_named: Vec<String>,
+    pub(crate) free: Vec<bool>,
     /// What is worth knowing about the sessions.
-    pub notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
     /// Axes of the root in measurement of each row.
     turn: Vec<Matrix3<f64>>,
 }
 
 impl Rows {
     /// What the equations of `row` say of a displacement of its target (m, rad, in root).
-    pub fn read(&self, row: usize, displacement: &Displacement) -> impl Iterator<Item = f64> {
+    pub(crate) fn read(&self, row: usize, displacement: &Displacement) -> impl Iterator<Item = f64> {
         let [x, y, z, rx, ry, rz] = *displacement;
         let (shift, turn) = (self.turn[row] * Vector3::new(x, y, z), self.turn[row] * Vector3::new(rx, ry, rz));
         self.equations.pick(row, [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z])
@@ -92,7 +85,7 @@ impl Rows {
 
     /// The displacement (m, rad, in root) that `row` has in the equations' `values` (all of them); nothing in what was not read.
     #[must_use]
-    pub fn displacement(&self, row: usize, values: &DVector<f64>) -> Displacement {
+    pub(crate) fn displacement(&self, row: usize, values: &DVector<f64>) -> Displacement {
         let [x, y, z, rx, ry, rz] = self.in_measurement(row, values);
         let (shift, turn) = (self.turn[row].tr_mul(&Vector3::new(x, y, z)), self.turn[row].tr_mul(&Vector3::new(rx, ry, rz)));
         [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z]
@@ -100,13 +93,13 @@ impl Rows {
 
     /// The same in the measurement frame.
     #[must_use]
-    pub fn in_measurement(&self, row: usize, values: &DVector<f64>) -> Displacement {
+    pub(crate) fn in_measurement(&self, row: usize, values: &DVector<f64>) -> Displacement {
         self.equations.pose(row, &values.as_slice()[self.equations.of(row)])
     }
 
     /// Shift of the target (m, in root) that each row has in the equations' `values`.
     #[must_use]
-    pub fn shifts(&self, values: &DVector<f64>) -> Vec<Vector3<f64>> {
+    pub(crate) fn shifts(&self, values: &DVector<f64>) -> Vec<Vector3<f64>> {
         let of = |row: usize| {
             let [x, y, z, ..] = self.displacement(row, values);
             Vector3::new(x, y, z)
@@ -116,7 +109,7 @@ impl Rows {
 
     /// What a unit move of `joint` does to the equations of `row`, m and rad.
     #[must_use]
-    pub fn moved(&self, row: usize, joint: usize) -> DVector<f64> {
+    pub(crate) fn moved(&self, row: usize, joint: usize) -> DVector<f64> {
         let moved = self.postures[row].moved(joint, self.mechanism.slides[joint], &self.targets[row]);
         DVector::from_vec(self.read(row, &moved).collect())
     }
@@ -124,24 +117,29 @@ impl Rows {
 
 /// Readings to be fitted.
 #[derive(Clone, Copy)]
-pub struct Readings<'a> {
+pub(crate) struct Readings<'a> {
     /// The sensor.
-    pub sensor: &'a Sensor,
+    pub(crate) sensor: &'a Sensor,
     /// What was read.
-    pub measurements: &'a [&'a Measurement],
+    pub(crate) measurements: &'a [&'a Measurement],
     /// Weight of each row: 1 for a good one that stands for itself.
-    pub weights: &'a [f64],
+    pub(crate) weights: &'a [f64],
     /// What effects that are already known do to the target: shift (m) and turn (rad) in root, row by row; empty for nothing.
-    pub displacement: &'a [Displacement],
+    pub(crate) displacement: &'a [Displacement],
     /// Joints that do not repeat.
-    pub scatter: &'a [Scatter],
+    pub(crate) scatter: &'a [Scatter],
 }
 
 /// Whether `measurements` can be of `arm` at all, as its file and the table's units say.
 ///
 /// # Errors
 /// If not: with what would explain it. Measurements that tell too little are no error here.
-pub fn check_robot(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], settings: &Model) -> Result<(), DiagnosisError> {
+pub(crate) fn check_robot(
+    arm: &Arm,
+    sensor: &Sensor,
+    measurements: &[&Measurement],
+    settings: &Model,
+) -> Result<(), DiagnosisError> {
     let weights = vec![1.0; measurements.len()];
     match fit(arm, Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[] }, settings) {
         Ok(_) | Err(DiagnosisError::Geometry(_)) => Ok(()),
@@ -153,7 +151,7 @@ pub fn check_robot(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], se
 ///
 /// # Errors
 /// If the measurements cannot tell.
-pub fn fit(arm: &Arm, readings: Readings<'_>, settings: &Model) -> Result<Rows, DiagnosisError> {
+pub(crate) fn fit(arm: &Arm, readings: Readings<'_>, settings: &Model) -> Result<Rows, DiagnosisError> {
     let Readings { sensor, measurements, weights, displacement, scatter } = readings;
     let scatter: Vec<(usize, f64)> = scatter.iter().map(|one| (one.joint, one.sigma)).collect();
     let fitted = geometry::fit(arm, geometry::Readings { sensor, measurements, weights, displacement, scatter: &scatter })?;
@@ -164,14 +162,14 @@ pub fn fit(arm: &Arm, readings: Readings<'_>, settings: &Model) -> Result<Rows, 
     let squares: f64 = (0..equations.readings()).map(of_position).sum();
     let rms = libm::sqrt(squares / measurements.len() as f64);
     if rms.is_nan() || rms >= settings.astray * reach.max(settings.small_arm_m) {
-        return Err(DiagnosisError::NotThisRobot { rms_mm: rms * 1e3, hint: mistake::hint(arm, measurements) });
+        return Err(DiagnosisError::NotThisRobot { rms_mm: rms * 1e3, hint: mistake::hint(arm, measurements, settings.mended) });
     }
     if fitted.parameters().amax() > settings.implausible {
         let [shift, turn] = fitted.largest_errors();
         return Err(DiagnosisError::NotThisGeometry {
             shift_mm: shift * 1e3,
             turn_deg: turn.to_degrees(),
-            hint: mistake::hint(arm, measurements),
+            hint: mistake::hint(arm, measurements, settings.mended),
         });
     }
     let mechanism = mechanism.with_chain(fitted.root_to_tool());
@@ -187,10 +185,8 @@ pub fn fit(arm: &Arm, readings: Readings<'_>, settings: &Model) -> Result<Rows, 
         fitted.measurement_from_root().iter().map(|base| base.rotation.to_rotation_matrix().into_inner()).collect();
     Ok(Rows {
         mechanism,
-        measurement_from_root: fitted.measurement_from_root().to_vec(),
         turn: fitted.session.iter().map(|session| turns[*session]).collect(),
         parameters: fitted.parameters().clone(),
-        session: fitted.session,
         postures,
         targets,
         equations: fitted.equations,
@@ -198,7 +194,6 @@ pub fn fit(arm: &Arm, readings: Readings<'_>, settings: &Model) -> Result<Rows, 
         whitening: fitted.whitening,
         jacobian: fitted.jacobian,
         free: fitted.free,
-        targets_named: fitted.targets,
         notes: fitted.notes,
     })
 }

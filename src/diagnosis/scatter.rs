@@ -1,7 +1,8 @@
 //! Joints that do not repeat: what remains lies along one joint's motion, larger than the sensor's noise and without order in anything
 //! that was recorded. Backlash does that where nobody recorded from which side the joint came. A variance of its own for that joint
-//! is compared with none, by marginal likelihood, and with the ripples and bumps that such scatter is mistaken for: among thousands of
-//! shapes one follows any scatter somewhat.
+//! is compared, by marginal likelihood, with none, with the ripples and bumps that such scatter is mistaken for (among thousands of
+//! shapes one follows any scatter somewhat), and with a sensor whose noise has another size along every axis; and most of what remains,
+//! large or small, must point along the joint's motion.
 
 use nalgebra::{DMatrix, DVector, DVectorView};
 
@@ -19,28 +20,20 @@ use crate::solver::whitening::Whitening;
 
 /// A joint that does not repeat.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scatter {
+pub(crate) struct Scatter {
     /// The joint, from 0.
-    pub joint: usize,
+    pub(crate) joint: usize,
     /// One sigma of its error beside a sensor that is as good as declared, rad or (where it slides) m; where the noise is larger, so is
     /// this.
-    pub sigma: f64,
+    pub(crate) sigma: f64,
     /// Logarithm of the odds of it against the sensor alone.
-    pub log_odds: f64,
+    pub(crate) log_odds: f64,
 }
 
-impl Scatter {
-    /// In words. `level`: mean square of the noise over the declared one.
-    pub(super) fn detail(&self, level: f64, slides: bool) -> String {
-        let sigma = self.sigma * libm::sqrt(level);
-        let (size, unit) = if slides { (sigma * 1e6, "µm") } else { (sigma.to_degrees() * 3600.0, "arcsec") };
-        format!("joint {} does not repeat: its errors scatter by {size:.0} {unit}, in no order that was recorded", self.joint + 1)
-    }
-}
-
-/// Whether both are the same joints, their sigmas the same within a step.
-pub(super) fn alike(one: &[Scatter], other: &[Scatter]) -> bool {
-    let near = |a: &Scatter, b: &Scatter| a.joint == b.joint && (0.7..1.5).contains(&(a.sigma / b.sigma));
+/// Whether both are the same joints, their sigmas alike.
+pub(super) fn alike(one: &[Scatter], other: &[Scatter], settings: &settings::Scatter) -> bool {
+    let [least, most] = settings.alike;
+    let near = |a: &Scatter, b: &Scatter| a.joint == b.joint && (least..most).contains(&(a.sigma / b.sigma));
     one.len() == other.len() && one.iter().all(|a| other.iter().any(|b| near(a, b)))
 }
 
@@ -158,8 +151,8 @@ impl<'a> Left<'a> {
     }
 
     /// Logarithm of the marginal likelihood of the residual with a scatter of `joint` besides `others` over that without, the noise's
-    /// level integrated out, the geometry as fitted, and the sigma averaged over; and the best sigma. `freedom`: equations that the
-    /// model leaves. A row counts by its weight.
+    /// level integrated out, the geometry as fitted, and the sigma averaged over; and the best sigma. `degrees_of_freedom`: equations that
+    /// the model leaves. A row counts by its weight.
     fn value(
         &self,
         degrees_of_freedom: f64,

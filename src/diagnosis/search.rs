@@ -10,35 +10,40 @@ use super::evidence::{Evidence, Extension};
 use crate::effects::{Kind, Location};
 use crate::seed::stream;
 
+/// Difference of log posteriors that is a step up: less is rounding, by which a climb would go round in circles.
+const BETTER: f64 = 1e-6;
+/// Weight, of all that may be drawn, below which nothing is: thousands of such hypotheses together change no probability that is said.
+const NEGLIGIBLE: f64 = 1e-9;
+
 /// What is claimed: a kind (or none) at a place.
-pub type Claim = (Option<Kind>, Location);
+pub(crate) type Claim = (Option<Kind>, Location);
 
 /// A claim with its probability and the hypothesis that stands for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Belief {
+pub(crate) struct Belief {
     /// The claim.
-    pub claim: Claim,
+    pub(crate) claim: Claim,
     /// Its likeliest variant.
-    pub hypothesis: usize,
+    pub(crate) hypothesis: usize,
     /// That it is there.
-    pub probability: f64,
+    pub(crate) probability: f64,
 }
 
 /// What a search found.
 #[derive(Clone, Debug, Default)]
-pub struct Found {
+pub(crate) struct Found {
     /// The likeliest set: hypotheses and scales of their priors, in the order in which they help most.
-    pub best: Vec<(usize, usize)>,
+    pub(crate) best: Vec<(usize, usize)>,
     /// Of each member of the best set, what may be in its place, likeliest first; what is missing from one is that nothing is.
-    pub causes: Vec<Vec<Belief>>,
+    pub(crate) causes: Vec<Vec<Belief>>,
     /// Every claim with its probability, likeliest first.
-    pub claims: Vec<Belief>,
+    pub(crate) claims: Vec<Belief>,
 }
 
 impl Found {
     /// The probability of `claim`.
     #[must_use]
-    pub fn probability(&self, claim: Claim) -> f64 {
+    pub(crate) fn probability(&self, claim: Claim) -> f64 {
         self.claims.iter().find(|belief| belief.claim == claim).map_or(0.0, |belief| belief.probability)
     }
 }
@@ -51,13 +56,13 @@ fn claim(evidence: &Evidence<'_>, hypothesis: usize) -> Claim {
 
 /// The likeliest set that can be reached from `start`, of `most` effects at most, and the logarithm of its posterior.
 #[must_use]
-pub fn climb(evidence: &Evidence<'_>, start: &[(usize, usize)], most: usize) -> (Vec<(usize, usize)>, f64) {
+pub(crate) fn climb(evidence: &Evidence<'_>, start: &[(usize, usize)], most: usize) -> (Vec<(usize, usize)>, f64) {
     let mut members = start.to_vec();
     let mut value = evidence.log_posterior(&members);
     loop {
         while members.len() < most {
             match best_addition(evidence, &members) {
-                Some((member, better)) if better > value + 1e-6 => {
+                Some((member, better)) if better > value + BETTER => {
                     members.push(member);
                     value = better;
                 }
@@ -75,7 +80,7 @@ pub fn climb(evidence: &Evidence<'_>, start: &[(usize, usize)], most: usize) -> 
             with.into_iter().chain([without]).max_by(|a, b| a.0.total_cmp(&b.0))
         });
         match exchanges.max_by(|a, b| a.0.total_cmp(&b.0)) {
-            Some((better, other)) if better > value + 1e-6 => (value, members) = (better, other),
+            Some((better, other)) if better > value + BETTER => (value, members) = (better, other),
             _ => return (members, value),
         }
     }
@@ -93,7 +98,7 @@ fn best_addition(evidence: &Evidence<'_>, members: &[(usize, usize)]) -> Option<
 
 /// Searches from `start` on. `most`: effects of a set at most.
 #[must_use]
-pub fn search(evidence: &Evidence<'_>, start: &[(usize, usize)], most: usize) -> Found {
+pub(crate) fn search(evidence: &Evidence<'_>, start: &[(usize, usize)], most: usize) -> Found {
     let (best, _) = climb(evidence, start, most);
     walk(evidence, &best, most)
 }
@@ -134,7 +139,7 @@ fn walk(evidence: &Evidence<'_>, best: &[(usize, usize)], most: usize) -> Found 
             let mut next = None;
             for extension in &extensions {
                 let weight = weight(extension);
-                if weight < 1e-9 * total {
+                if weight < NEGLIGIBLE * total {
                     continue;
                 }
                 add(&mut here, claim(evidence, extension.member.0), weight / total, extension.member.0);
@@ -182,7 +187,7 @@ fn walk(evidence: &Evidence<'_>, best: &[(usize, usize)], most: usize) -> Found 
             continue;
         }
         let own = best.get(place).copied().filter(|(member, _)| claim(evidence, *member) == likeliest.claim);
-        members.push(own.unwrap_or((likeliest.hypothesis, 1)));
+        members.push(own.unwrap_or((likeliest.hypothesis, evidence.settings.search.stand_in_scale)));
         causes.push(beliefs);
     }
     let order = in_order(evidence, &members);

@@ -157,6 +157,12 @@ settings! {
         log_sigma_matters: f64 = 0.1 => 0.0..=10.0,
         /// Standard errors that are chance.
         standard_errors: f64 = 3.0 => 0.0..=100.0,
+        /// Correlation of readings of one configuration that is taken where there are too few pairs to estimate it.
+        few_pairs_correlation: f64 = 0.5 => SHARE,
+        /// Weight for being far off above which a row tells how alike readings of one configuration are.
+        near: f64 = 0.5 => SHARE,
+        /// Weight, all reasons together, above which a row tells how exact orientations are beside positions.
+        counted: f64 = 0.3 => SHARE,
     }
 
     /// How the linear problem is made.
@@ -172,6 +178,8 @@ settings! {
         geometry_scales: Vec<f64> = vec![3.0, 1.0, 0.3, 0.1, 0.03] => 1e-6..=1e3,
         /// Of the noise, the difference between loads as they are and as they are read that is worth trying both.
         loads_matter: f64 = 0.3 => 0.0..=MANY,
+        /// Passes in which both are tried: those in which the geometry's prior is chosen, and two around it.
+        loads_passes: usize = 5 => 0.0..=100.0,
         /// Of the noise, the movement of a target from pass to pass that is nothing.
         settled: f64 = 0.1 => 0.0..=MANY,
         /// Change of a row's weight from pass to pass that is nothing.
@@ -181,6 +189,10 @@ settings! {
         upright: f64 = 6.0 => 0.0..=MANY,
         /// Moments of a step that are tried at most.
         change_points: usize = 80 => 1.0..=MANY,
+        /// Share of the readings that a step leaves before it and after it at least.
+        change_margin: f64 = 0.1 => 0.0..=0.5,
+        /// The same as a number of readings: fewer do not tell where the base then stands.
+        change_margin_readings: usize = 3 => 1.0..=MANY,
         /// Fitted errors of a frame over their prior's sigma beyond which it is another robot, or its readings are wrong.
         implausible: f64 = 12.0 => 1.0..=MANY,
         /// What remains (RMS) over the arm's reach beyond which it is another robot.
@@ -189,6 +201,8 @@ settings! {
         temperature_k: f64 = 0.05 => 0.0..=100.0,
         /// Reach below which an arm counts as one of this reach there, m.
         small_arm_m: f64 = 0.1 => 1e-6..=MANY,
+        /// Share of a misfit that may be left where a mistake in the table (units, senses, swapped columns) is said to explain it.
+        mended: f64 = 0.2 => SHARE,
     }
 
     /// What is likely before any reading is looked at.
@@ -221,6 +235,8 @@ settings! {
         spare: usize = 1 => 0.0..=24.0,
         /// Additions whose posterior is computed exactly: how signs shift beside a new member is left out at first.
         exact: usize = 6 => 1.0..=100.0,
+        /// Number (from 0) of the prior scale of a member for which none was chosen: that of worse arms than usual.
+        stand_in_scale: usize = 1 => 0.0..=(SCALES - 1) as f64,
     }
 
     /// Gear ripple of any tooth count.
@@ -246,6 +262,8 @@ settings! {
         along: f64 = 3.5 => 0.0..=MANY,
         /// Held-out RMS with joints that do not repeat, over that without, from which on there are none.
         worse: f64 = 1.03 => 0.0..=MANY,
+        /// Ratio of two sigmas of a joint's scatter, from and to, that are the same: within about a step.
+        alike: [f64; 2] = [0.7, 1.5] => 0.0..=MANY,
     }
 
     /// Readings that are far off.
@@ -260,12 +278,26 @@ settings! {
         factor: f64 = 4.0 => 1.0..=MANY,
         /// The same beside something unknown: a misfit has tails, too.
         factor_beside_unknown: f64 = 9.0 => 1.0..=MANY,
+        /// Shares of the readings that are tried, each as likely.
+        shares: Vec<f64> = vec![0.02, 0.03, 0.05, 0.08, 0.12, 0.18] => 1e-6..=0.999,
+        /// Their noise over that of the others that is tried, each as likely.
+        factors: Vec<f64> = vec![4.0, 6.0, 9.0, 14.0, 20.0] => 1.0..=MANY,
+        /// The mean square of good readings is not known well and is averaged over: from value to value its logarithm goes on by so much.
+        level_step: f64 = 0.08 => 1e-6..=10.0,
+        /// Steps of it to either side of what it looks like.
+        level_steps: u8 = 6 => 0.0..=60.0,
+        /// Share of the readings whose side of play is known from which on they alone tell the share of those far off.
+        decided: f64 = 0.5 => SHARE,
     }
 
     /// Readings that are left out, and structure that remains.
     Validation {
         /// Folds.
         folds: usize = 5 => 2.0..=100.0,
+        /// Configurations per region at least; where there are fewer there are fewer regions, but never less than two.
+        configurations: usize = 4 => 1.0..=MANY,
+        /// Share of the readings that must be left without a fold: fewer would hardly tell where the arm stands.
+        left: f64 = 0.25 => SHARE,
         /// Largest gain of a fold that counts against the losses of others, as a logarithm of mean squares.
         largest_gain: f64 = 1.0 => 0.0..=MANY,
         /// Largest loss of a fold, the same.
@@ -282,6 +314,8 @@ settings! {
         named: f64 = 0.5 => SHARE,
         /// From this probability on nothing else needs to be considered.
         sure: f64 = 0.95 => SHARE,
+        /// Share of the folds that must choose a cause for it to be settled.
+        folds: f64 = 0.5 => SHARE,
         /// A hypothesis of a set that cannot be told apart has at least this probability.
         worth_saying: f64 = 0.03 => SHARE,
         /// Of the residual having no structure: below this probability there is some.
@@ -302,10 +336,16 @@ settings! {
         few: f64 = 4.0 => 1.0..=MANY,
         /// Error by rounded joint readings over the sensor's from which on it is worth a word.
         rounded: f64 = 0.3 => 0.0..=MANY,
+        /// Error by rounded joint readings over what geometry leaves beyond which the arm stood where the rounded readings say.
+        rounded_over_left: f64 = 1.5 => 0.0..=MANY,
         /// Shapes without a name that are said of what is unknown, the largest first.
         unknown_said: usize = 4 => 0.0..=100.0,
         /// Correlation of readings of one configuration that is worth a word.
         correlation: f64 = 0.05 => SHARE,
+        /// Square of the gap between held-out errors and noise, over that of the noise, above which shares of it mean something.
+        gap: f64 = 0.02 => 0.0..=MANY,
+        /// Share of its square that remains of a fitted length at least, when what noise adds to lengths is taken off.
+        shortened: f64 = 0.05 => SHARE,
     }
 
     /// What would have shown.
@@ -318,12 +358,18 @@ settings! {
         draws: usize = 192 => 1.0..=MANY,
         /// Variants of a claim that are taken as the truth.
         truths: usize = 4 => 1.0..=MANY,
-        /// Variants of the same claim that are looked at, and rivals.
+        /// Variants of the same claim that are looked at, and of other claims.
         alike: [usize; 2] = [9, 10] => 1.0..=MANY,
-        /// Likeness (cosine squared) from which on a rival is looked at.
+        /// Likeness (cosine squared) from which on a hypothesis of another claim is looked at.
         unlike: f64 = 0.01 => SHARE,
-        /// Likeness from which on a rival is why something would not show.
+        /// Likeness from which on that is why something would not show.
         likeness_said: f64 = 0.8 => SHARE,
+        /// Share of a claim's variants that survive geometry, below which no least magnitude is told.
+        surviving: f64 = 0.5 => SHARE,
+        /// Information (λ of the middle of what is realistic) below which a variant does not survive geometry.
+        nothing: f64 = 1e-8 => 0.0..=MANY,
+        /// Least magnitude over the largest realistic one from which on none is told.
+        beyond: f64 = 1e4 => 1.0..=1e12,
     }
 }
 
@@ -366,6 +412,9 @@ impl Settings {
         if !rising(&self.decision.usual_noise) {
             return not("decision.usual_noise", &self.decision.usual_noise, "the least and the most");
         }
+        if !rising(&self.scatter.alike) {
+            return not("scatter.alike", &self.scatter.alike, "the least and the most");
+        }
         Ok(())
     }
 }
@@ -396,6 +445,9 @@ mod tests {
             ("diagnosis.prior.scales", "[1,3,2,4]", "numbers that rise"),
             ("diagnosis.prior.scale_shares", "[0.5,0.5,0.5,0.5]", "the sum 1"),
             ("diagnosis.decision.usual_noise", "[3,1]", "the least and the most"),
+            ("diagnosis.scatter.alike", "[2,1]", "the least and the most"),
+            ("diagnosis.outliers.shares", "[0.1,1]", "allowed is 0.000001 to 0.999"),
+            ("diagnosis.search.stand_in_scale", "4", "allowed is 0 to 3"),
         ] {
             assert!(Settings::default().with(key, value).unwrap_err().contains(said), "{key} {value}");
         }

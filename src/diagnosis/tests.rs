@@ -3,25 +3,29 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, UnitQuaternion, Vector3};
 
+use super::conclusion::{Trend, Variable};
 use super::held_out::{Fold, used};
 use super::outcome::{Diagnosis, NoiseSource, Verdict};
+use super::search::Belief;
 use super::{Options, diagnose};
 use crate::arm::Arm;
 use crate::effects::Kind;
+use crate::effects::signature::library::Hypothesis;
 use crate::effects::signature::posture::Mechanism;
 use crate::measurement::{Measurement, Sensor};
 use crate::recording::schema::{check, json_schema};
+use crate::report::wording;
 use crate::scene;
 use crate::seed::{Stream, stream};
 
-const SIGMA: f64 = 20e-6;
+pub(crate) const SIGMA: f64 = 20e-6;
 const ORIENTATION_SIGMA: f64 = 2e-5;
 
 fn arm() -> Arm {
     scene::read(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml")).unwrap().scene.arm
 }
 
-fn sensor() -> Sensor {
+pub(crate) fn sensor() -> Sensor {
     Sensor {
         position_in_base: nalgebra::Point3::origin(),
         position_sigma_m: SIGMA,
@@ -55,7 +59,7 @@ fn torque(arm: &Arm, joints: &[f64], joint: usize, payload_kg: f64) -> f64 {
     -(at(1e-5) - at(-1e-5)) / 2e-5
 }
 
-fn readings(label: &str, off: impl Fn(&Arm, &[f64], &[i8], usize, f64) -> f64) -> (Arm, Vec<Measurement>) {
+pub(crate) fn readings(label: &str, off: impl Fn(&Arm, &[f64], &[i8], usize, f64) -> f64) -> (Arm, Vec<Measurement>) {
     let arm = arm();
     let (mut stream, mut turns): (Stream, Stream) = (stream(5, label), stream(6, label));
     let mut values = arm.chain.nominal();
@@ -93,9 +97,74 @@ fn readings(label: &str, off: impl Fn(&Arm, &[f64], &[i8], usize, f64) -> f64) -
     (arm, rows)
 }
 
-fn diagnosed(arm: &Arm, rows: &[Measurement], without: Vec<Kind>) -> Diagnosis {
+/// An analysis of readings whose joint angles are `off`, in which nothing is found yet: a test changes in it what it asks about.
+pub(crate) fn with_analysis(off: impl Fn(&Arm, &[f64], &[i8], usize, f64) -> f64, ask: impl FnOnce(super::Analysis<'_>)) {
+    let (arm, rows) = readings("test/analysis", off);
     let rows: Vec<&Measurement> = rows.iter().collect();
-    diagnose(arm, &sensor(), &rows, &Options { without, ..Options::new(NoiseSource::Declared) }).unwrap()
+    let (options, sensor) = (Options::new(NoiseSource::Declared), sensor());
+    let data = super::Data::new(&arm, &sensor, &rows, &options);
+    let pass = super::Pass::new(&data, &super::State::nominal(&data), options.settings.model.passes).unwrap();
+    let linear = pass.linear();
+    let marginal = super::Marginal::new(&pass.products, None, &linear.prior).unwrap();
+    let evidence =
+        super::Evidence { marginal: &marginal, candidates: &pass.candidates, noise: data.noise, settings: &options.settings };
+    let nothing = DVector::zeros(linear.residual.len());
+    ask(super::Analysis {
+        moved: super::moved(&linear, &evidence, &[]),
+        residuals: super::residuals(&pass.rows, &rows, &nothing, &nothing),
+        maps: Vec::new(),
+        linear: &linear,
+        conditions: &pass.conditions,
+        evidence,
+        found: super::Found::default(),
+        held_out: Vec::new(),
+        structure: super::open_set::Structure {
+            p_value: 0.5,
+            strongest: Trend { along: None, follows: Variable::Time },
+            strength: 0.0,
+        },
+        outliers: super::outliers::Outliers { probability: 0.0, share: 0.0, share_ci95: [0.0; 2], factor: 1.0, rows: Vec::new() },
+        scatter: Vec::new(),
+        orientation: 1.0,
+        measurements: &rows,
+        sensor: &sensor,
+        repeats: None,
+        correlation: None,
+        options: &options,
+    });
+}
+
+/// The first hypothesis of `kind` at joint or link number `index`.
+pub(crate) fn hypothesis(analysis: &super::Analysis<'_>, kind: Option<Kind>, index: usize) -> usize {
+    let is = |of: &Hypothesis| of.kind == kind && of.location.index == Some(index);
+    analysis.evidence.candidates.hypotheses.iter().position(is).unwrap()
+}
+
+/// A belief in it.
+pub(crate) fn belief(analysis: &super::Analysis<'_>, kind: Option<Kind>, index: usize, probability: f64) -> Belief {
+    let hypothesis = hypothesis(analysis, kind, index);
+    let of = &analysis.evidence.candidates.hypotheses[hypothesis];
+    Belief { claim: (of.kind, of.location), hypothesis, probability }
+}
+
+/// A fold of ten readings with these sums of squares, for which `chosen` was chosen.
+pub(crate) fn fold_of([nominal, geometry, explained]: [f64; 3], with_best: &[f64], chosen: Vec<usize>) -> Fold {
+    Fold {
+        name: String::new(),
+        rows: 10,
+        nominal,
+        geometry,
+        with_best: with_best.to_vec(),
+        explained,
+        with_chosen: vec![explained; chosen.len()],
+        used: chosen.len(),
+        chosen,
+    }
+}
+
+pub(crate) fn diagnosed(arm: &Arm, rows: &[Measurement], without: Vec<Kind>) -> Diagnosis {
+    let rows: Vec<&Measurement> = rows.iter().collect();
+    wording::diagnosis(diagnose(arm, &sensor(), &rows, &Options { without, ..Options::new(NoiseSource::Declared) }).unwrap())
 }
 
 #[test]
@@ -179,7 +248,7 @@ fn orientations_that_are_better_than_said_are_no_effect() {
     let sensor = Sensor { orientation_sigma_rad: Some(4.5 * ORIENTATION_SIGMA), ..sensor() };
     let rows: Vec<&Measurement> = rows.iter().collect();
     let options = Options { without: Vec::new(), ..Options::new(NoiseSource::Declared) };
-    let found = diagnose(&arm, &sensor, &rows, &options).unwrap();
+    let found = wording::diagnosis(diagnose(&arm, &sensor, &rows, &options).unwrap());
     assert!(found.effects.is_empty() && !found.unknown.present, "{}", found.sentence);
     let sigma = found.noise_floor.rotation_rad.unwrap();
     assert!((sigma / ORIENTATION_SIGMA - 1.0).abs() < 0.25, "{sigma}");

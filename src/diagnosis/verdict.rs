@@ -1,20 +1,20 @@
-//! From what was found to what is said: the verdict, and all that stands beside it.
+//! From what was found to what it comes to: the verdict, and all that stands beside it.
 
 use super::Analysis;
 use super::advice::next;
+use super::conclusion::Conclusion;
 use super::confusion::confusion;
 use super::detectability::detectability;
 use super::gap::Closing;
 use super::naming::name;
 use super::notes::notes;
-use super::outcome::{Candidate, Diagnosis, Effect, NoiseFloor, NoiseSource, Residual, Unknown, Verdict};
-use super::sentence::sentence;
+use super::outcome::{Candidate, Effect, NoiseFloor, NoiseSource, Residual, Verdict};
 use super::settings::Decision;
 use super::unknown::unknown;
 use crate::effects::Kind;
 
-/// Puts the analysis into words and numbers.
-pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
+/// What the analysis comes to.
+pub(super) fn conclude(analysis: &Analysis<'_>) -> Conclusion {
     let settings = &analysis.options.settings.decision;
     let noise_floor = noise_floor(analysis);
     let level = analysis.evidence.noise_level(&analysis.found.best);
@@ -25,14 +25,13 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
     let confusion_sets = confusion(analysis);
     let power = detectability(analysis, level);
     let notes = notes(analysis, level, &noise_floor, &gap);
-    let verdict = decide(&unknown, &named.effects, &confusion_sets, power.share, settings);
-    Diagnosis {
+    let verdict = decide(unknown.present, &named.effects, &confusion_sets, power.share, settings);
+    Conclusion {
         verdict,
-        sentence: sentence(verdict, &named.effects, &confusion_sets, &unknown, &gap, &power, settings.sure),
         gap,
         unknown,
         maps: analysis.maps.clone(),
-        next_measurements: next(analysis, &confusion_sets, &power, verdict),
+        next: next(analysis, &confusion_sets, &power, verdict),
         notes,
         settings: analysis.options.settings.clone(),
         readings: analysis.measurements.len(),
@@ -42,6 +41,7 @@ pub(super) fn put(analysis: &Analysis<'_>) -> Diagnosis {
         confusion_sets,
         undetectable: power.undetectable,
         detectable: power.detectable,
+        detectable_share: power.share,
     }
 }
 
@@ -61,13 +61,15 @@ fn noise_floor(analysis: &Analysis<'_>) -> NoiseFloor {
     NoiseFloor { position_m, rotation_rad, source }
 }
 
-/// `share`: of the kinds and places that would have shown.
-fn decide(unknown: &Unknown, effects: &[Effect], sets: &[Vec<Candidate>], share: f64, settings: &Decision) -> Verdict {
-    // Sure, and the same for half of the folds at least.
-    let settled = |effect: &&Effect| effect.probability >= settings.sure && 2 * effect.folds[0] >= effect.folds[1];
+/// `unknown`: whether something is left. `share`: of the kinds and places that would have shown.
+fn decide(unknown: bool, effects: &[Effect], sets: &[Vec<Candidate>], share: f64, settings: &Decision) -> Verdict {
+    // Sure, and the same for enough folds.
+    let settled = |effect: &&Effect| {
+        effect.probability >= settings.sure && effect.folds[0] as f64 >= settings.folds * effect.folds[1] as f64
+    };
     let named: Vec<&Effect> = effects.iter().filter(|effect| effect.kind != Kind::MeasurementOutliers).collect();
     let open = sets.iter().any(|set| set.iter().map(|candidate| candidate.probability).sum::<f64>() >= settings.named);
-    if unknown.present {
+    if unknown {
         Verdict::UnknownRemains
     } else if !named.is_empty() && named.iter().all(settled) {
         Verdict::Explained
@@ -126,8 +128,7 @@ mod tests {
     #[test]
     fn verdicts_are_those_of_the_guide() {
         let decide = |unknown: bool, effects: &[Effect], sets: &[Vec<Candidate>], share: f64| {
-            let unknown = Unknown { present: unknown, p_value: 0.5, r#where: None };
-            super::decide(&unknown, effects, sets, share, &Decision::default())
+            super::decide(unknown, effects, sets, share, &Decision::default())
         };
         let backlash = |probability: f64, chosen: usize| effect(Kind::Backlash, probability, chosen);
         // Nothing is seen: how much could have been decides.
@@ -148,7 +149,6 @@ mod tests {
         assert_eq!(decide(true, &[], &[], 0.0), Verdict::UnknownRemains);
         // The numbers that decide can be changed.
         let strict = Decision { sure: 0.999, ..Decision::default() };
-        let unknown = Unknown { present: false, p_value: 0.5, r#where: None };
-        assert_eq!(super::decide(&unknown, &[backlash(0.99, 5)], &[], 0.9, &strict), Verdict::Ambiguous);
+        assert_eq!(super::decide(false, &[backlash(0.99, 5)], &[], 0.9, &strict), Verdict::Ambiguous);
     }
 }

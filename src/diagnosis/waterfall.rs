@@ -21,14 +21,14 @@ const PASSES: usize = 4;
 /// Readings with the folds of their diagnosis and the weights that they have beside the effects named: the same for every step of a
 /// waterfall.
 #[derive(Clone, Debug)]
-pub struct Waterfall<'a> {
+pub(crate) struct Waterfall<'a> {
     arm: &'a Arm,
     sensor: &'a Sensor,
     measurements: &'a [&'a Measurement],
     /// Geometry fitted beside the effects.
-    pub rows: Rows,
+    pub(crate) rows: Rows,
     /// Readings as signatures see them.
-    pub conditions: Conditions,
+    pub(crate) conditions: Conditions,
     scheme: Scheme,
     weights: Vec<f64>,
     good: Vec<bool>,
@@ -41,7 +41,7 @@ impl<'a> Waterfall<'a> {
     ///
     /// # Errors
     /// If the measurements cannot tell where the arm stands, or are not this robot's.
-    pub fn new(
+    pub(crate) fn new(
         arm: &'a Arm,
         sensor: &'a Sensor,
         measurements: &'a [&'a Measurement],
@@ -55,7 +55,7 @@ impl<'a> Waterfall<'a> {
         let rows =
             rows::fit(arm, Readings { sensor, measurements, weights: &start, displacement: &[], scatter: &[] }, &settings.model)?;
         let (conditions, _) = conditions::conditions(measurements, &rows, &[], Loads::AsItStands, None, &settings.model);
-        let scheme = held_out::schemes(measurements, &rows.targets, &groups, settings.validation.folds).swap_remove(0);
+        let scheme = held_out::schemes(measurements, &rows.targets, &groups, &settings.validation).swap_remove(0);
         let good = vec![true; total];
         let mut waterfall = Waterfall { arm, sensor, measurements, rows, conditions, scheme, weights: start, good, settings };
         for _ in 0..PASSES {
@@ -80,7 +80,7 @@ impl<'a> Waterfall<'a> {
     /// they are: loads are those of the arm as it stands with them, also where the diagnosis found that the readings already say where it
     /// stands.
     #[must_use]
-    pub fn together(&self, effects: &[Effect]) -> Vec<Displacement> {
+    pub(crate) fn together(&self, effects: &[Effect]) -> Vec<Displacement> {
         let present = |reading: &Reading| -> Vec<Present> {
             let known = effects.iter().filter_map(|effect| {
                 let signature = effect.signature.as_ref().filter(|signature| signature.shape.can_be_read(reading))?;
@@ -102,7 +102,7 @@ impl<'a> Waterfall<'a> {
     /// What `effect` does to the target in each reading (shift in m, turn in rad, in root), to first order: the columns of what it was
     /// diagnosed to follow times their coefficients. `None` where it follows nothing (outliers), or where the readings lack what it needs.
     #[must_use]
-    pub fn displacements(&self, effect: &Effect) -> Option<Vec<Displacement>> {
+    pub(crate) fn displacements(&self, effect: &Effect) -> Option<Vec<Displacement>> {
         let signature = effect.signature.as_ref()?;
         let orientation = self.rows.equations.has_orientation();
         self.conditions.readings.iter().map(|reading| signature.displacement(reading, orientation)).collect()
@@ -113,7 +113,7 @@ impl<'a> Waterfall<'a> {
     ///
     /// # Errors
     /// If what remains is not this robot's.
-    pub fn after(&self, displacements: &[Displacement]) -> Result<f64, DiagnosisError> {
+    pub(crate) fn after(&self, displacements: &[Displacement]) -> Result<f64, DiagnosisError> {
         use rayon::prelude::*;
         let (sensor, measurements) = (self.sensor, self.measurements);
         let squares: Vec<(f64, usize)> = (0..self.scheme.folds)
@@ -135,5 +135,41 @@ impl<'a> Waterfall<'a> {
             .collect::<Result<_, DiagnosisError>>()?;
         let (sum, count) = squares.iter().fold((0.0, 0), |(sum, count), one| (sum + one.0, count + one.1));
         Ok(libm::sqrt(sum / count.max(1) as f64))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::tests::{SIGMA, diagnosed, readings, sensor};
+
+    /// The waterfall from geometry to the noise, with readings of which only the play is wrong.
+    #[test]
+    fn the_true_cause_takes_held_out_errors_down_to_the_noise() {
+        let width = 8e-4;
+        let (arm, rows) = readings(
+            "test/waterfall",
+            |_, _, approach, joint, _| {
+                if joint == 2 { 0.5 * width * f64::from(approach[2]) } else { 0.0 }
+            },
+        );
+        let found = diagnosed(&arm, &rows, Vec::new());
+        let (rows, sensor, settings): (Vec<&Measurement>, _, _) = (rows.iter().collect(), sensor(), Settings::default());
+        let waterfall = Waterfall::new(&arm, &sensor, &rows, &found.effects, &settings).unwrap();
+        let nothing = waterfall.after(&vec![[0.0; 6]; rows.len()]).unwrap();
+        let all = waterfall.after(&waterfall.together(&found.effects)).unwrap();
+        let noise = 3_f64.sqrt() * SIGMA;
+        // Sixty readings do not tell geometry quite.
+        assert!((noise..2.0 * noise).contains(&all) && nothing > 2.0 * all, "{nothing} {all}");
+        // One effect and nothing else: its columns are what all do together, to second order.
+        let alone = waterfall.displacements(&found.effects[0]).unwrap();
+        let size = |of: &Displacement| of[0].hypot(of[1]).hypot(of[2]);
+        for (one, together) in alone.iter().zip(waterfall.together(&found.effects)) {
+            assert!((size(one) - size(&together)).abs() < 1e-6, "{one:?} {together:?}");
+        }
+        // Where the readings lack what an effect follows, nothing is said.
+        let mut blind = waterfall.clone();
+        blind.conditions.readings.iter_mut().for_each(|reading| reading.approach.clear());
+        assert_eq!(blind.displacements(&found.effects[0]), None);
     }
 }

@@ -32,7 +32,7 @@ pub(super) fn weigh(rows: &Rows, residual: &DVector<f64>, before: &[f64], groups
     let squares: Vec<f64> =
         (0..before.len()).map(|row| sigmas[equations.of(row)].iter().map(|value| value * value).sum::<f64>()).collect();
     let far = robust::weights(&squares, &equations.counts());
-    let near: Vec<bool> = far.iter().map(|weight| *weight > 0.5).collect();
+    let near: Vec<bool> = far.iter().map(|weight| *weight > settings.near).collect();
     let (dependent, correlation) = groups::weights(groups, &sigmas, equations, &near, settings);
     Weighed { squares, far, dependent, correlation }
 }
@@ -62,7 +62,7 @@ pub(super) fn orientation_over_position(rows: &Rows, residual: &DVector<f64>, kn
         return None;
     }
     let whitened = rows.whitening.of_vector(residual);
-    let counts: Vec<usize> = (0..rows.postures.len()).filter(|row| rows.whitening.weights()[*row] > 0.3).collect();
+    let counts: Vec<usize> = (0..rows.postures.len()).filter(|row| rows.whitening.weights()[*row] > settings.counted).collect();
     let level = |part: &dyn Fn(usize) -> Range<usize>| {
         let square = |row: &usize| {
             let part = part(*row);
@@ -83,4 +83,49 @@ pub(super) fn orientation_over_position(rows: &Rows, residual: &DVector<f64>, kn
     let readings: f64 = counts.iter().map(|row| rows.whitening.weights()[*row]).sum();
     let deviation = if known { 0.0 } else { libm::sqrt(2.0 / (6.0 * 0.6 * readings)) };
     (log.abs() > settings.log_sigma_matters + settings.standard_errors * deviation).then(|| libm::exp(log))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::tests::{SIGMA, sensor, with_analysis};
+    use crate::seed::stream;
+
+    /// Squares are those of residuals over the declared sigma, whatever weights were in the whitening.
+    #[test]
+    fn a_row_that_counts_less_is_no_nearer() {
+        with_analysis(
+            |_, _, _, _, _| 0.0,
+            |analysis| {
+                let (rows, count) = (analysis.linear.rows, analysis.measurements.len());
+                let groups = groups::groups(analysis.measurements, &Noise::default());
+                let mut draws = stream(1, "test/weights");
+                let mut residual = DVector::from_fn(3 * count, |_, _| SIGMA * draws.normal());
+                residual.rows_mut(3 * 7, 3).fill(100.0 * SIGMA);
+                let found = weigh(rows, &residual, &vec![1.0; count], &groups, &Noise::default());
+                for (row, square) in found.squares.iter().enumerate() {
+                    let expected = residual.rows(3 * row, 3).norm_squared() / (SIGMA * SIGMA);
+                    assert!((square / expected - 1.0).abs() < 1e-9, "{row}: {square} against {expected}");
+                }
+                // One reading a hundred sigmas off weighs next to nothing; each is alone in its configuration.
+                assert!(found.far[7] < 1e-4 && found.far.iter().filter(|weight| **weight == 1.0).count() > 55);
+                assert!(found.dependent.iter().all(|weight| *weight == 1.0) && found.correlation == 0.0);
+            },
+        );
+    }
+
+    #[test]
+    fn repeats_tell_the_orientations_beyond_chance_only() {
+        let said = Sensor { orientation_sigma_rad: Some(1e-4), ..sensor() };
+        let of = |orientation_rad: Option<f64>, degrees_of_freedom: f64| {
+            let repeats = Repeats { position_m: 2.0 * SIGMA, orientation_rad, degrees_of_freedom, moved: true };
+            orientation_of_repeats(&said, Some(repeats), SIGMA, &Noise::default())
+        };
+        // Positions are twice as noisy as is said; orientations that are four times so are twice as noisy beside them.
+        assert!((of(Some(4e-4), 900.0).unwrap() - 2.0).abs() < 1e-12);
+        // A ratio of 1.15 is nothing beside a tenth and three standard errors of a thirtieth.
+        assert_eq!(of(Some(2.3e-4), 900.0), Some(1.0));
+        assert_eq!(of(Some(4e-4), 30.0), None);
+        assert_eq!(of(None, 900.0), None);
+    }
 }

@@ -23,6 +23,8 @@ pub struct Descriptor {
     pub source: Source,
     /// Whether physics allows one sign only, in which case the diagnosis allows no other. Kinds of several coefficients have no sign.
     pub one_signed: bool,
+    /// Whether results tell its sign beside its magnitude, which is positive then (as a width is).
+    pub sign_apart: bool,
     /// What gravity has to do with it.
     pub load: Load,
     /// What the data must have for it to be seen, or to have its unit.

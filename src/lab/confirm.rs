@@ -570,7 +570,7 @@ mod tests {
 
     fn diagnosed(scene: &Scene, rows: &[&Measurement]) -> Diagnosis {
         let options = Options::new(NoiseSource::Declared);
-        diagnose(&scene.arm, &scene.sensor, rows, &options).unwrap()
+        crate::report::wording::diagnosis(diagnose(&scene.arm, &scene.sensor, rows, &options).unwrap())
     }
 
     /// As a diagnosis names it that found these coefficients, in a session of `rows` readings at the same pace.
@@ -794,7 +794,7 @@ mod tests {
         let schema = json_schema::<Confirmation>("confirmation");
         check(&schema, &serde_json::to_value(&found).unwrap()).unwrap();
         // Columns stand under each other.
-        let text = crate::report::confirm::text(&found);
+        let text = crate::lab::report::confirm::text(&found);
         let widths: Vec<usize> =
             text.lines().filter(|line| line.contains("  ") && line.starts_with(' ')).map(|line| line.chars().count()).collect();
         assert!(widths.len() == 5 && widths.iter().all(|width| *width == widths[0]), "{text}");

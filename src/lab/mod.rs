@@ -7,6 +7,7 @@ pub mod confirm;
 pub mod detectability;
 pub mod effect_validation;
 pub mod injection;
+pub mod report;
 pub mod reproduce;
 #[cfg(test)]
 mod signature_check;

@@ -1,7 +1,7 @@
 //! A diagnosis for people: the verdict in a sentence, the waterfall, the causes, where, and what to measure next.
 
 use super::table;
-use crate::diagnosis::held_out::Block;
+use super::wording::blocks;
 use crate::diagnosis::outcome::{Candidate, Diagnosis, Map, NoiseSource, Place};
 use crate::effects::{Kind, Level, Location};
 use crate::units::number;
@@ -105,11 +105,7 @@ fn waterfall(diagnosis: &Diagnosis) -> String {
     let mut text = table(&[&format!("held out, {} folds", gap.folds), "RMS, µm", ""], rows);
     text.push('\n');
     for other in &gap.blocked {
-        let by = match other.by {
-            Block::Region => "regions",
-            Block::Payload => "payloads",
-            Block::Session => "sessions",
-        };
+        let by = blocks(other.by);
         let of_fold: Vec<String> = other
             .left_out
             .iter()

@@ -1,21 +1,10 @@
 //! Results as tables and figures for people. Units are in the headers; machines get the same results as JSON.
 
-#[cfg(feature = "cli")]
-pub mod challenge;
-#[cfg(feature = "cli")]
-pub mod confirm;
 pub mod diagnosis;
-#[cfg(feature = "cli")]
-pub mod effects;
-#[cfg(feature = "cli")]
-pub mod findings;
-#[cfg(feature = "cli")]
-pub mod power;
-#[cfg(feature = "cli")]
-pub mod sweep;
 
 mod advice;
 pub mod criterion;
+pub mod wording;
 
 use comfy_table::{Cell, CellAlignment, LineStyle, Table, TableStyle};
 
@@ -33,7 +22,7 @@ const STYLE: TableStyle = TableStyle::new()
     .bottom_border(LineStyle::none().fill('─').junction('─'));
 
 /// A table whose first column is text and whose others are numbers.
-fn table(header: &[&str], rows: Vec<Vec<String>>) -> String {
+pub(crate) fn table(header: &[&str], rows: Vec<Vec<String>>) -> String {
     let mut table = Table::new();
     table.load_style(STYLE).set_header(header.iter().enumerate().map(|(column, name)| cell(column, name)));
     for row in rows {

@@ -5,26 +5,26 @@ const RARE: [f64; 7] = [1.0, 10.83, 13.82, 16.27, 18.47, 20.52, 22.46];
 /// Medians of the same squares.
 const MEDIAN: [f64; 7] = [1.0, 0.455, 1.386, 2.366, 3.357, 4.351, 5.348];
 /// A row that counts less than this is far off by twice the distance that is rare.
-pub const FAR: f64 = 1.0 / 16.0;
+pub(crate) const FAR: f64 = 1.0 / 16.0;
 /// Expected number of runs as long by chance below which neighbours that are far off are one event: a step or a session, not errors
 /// of single readings.
 const BY_CHANCE: f64 = 1e-3;
 
 /// Beyond what one square in a thousand lies where `equations` numbers have Gaussian noise, in sigmas.
 #[must_use]
-pub fn rare(equations: usize) -> f64 {
+pub(crate) fn rare(equations: usize) -> f64 {
     RARE[equations.min(RARE.len() - 1)]
 }
 
 /// The median of the squares of `equations` numbers with Gaussian noise, in sigmas.
 #[must_use]
-pub fn median(equations: usize) -> f64 {
+pub(crate) fn median(equations: usize) -> f64 {
     MEDIAN[equations.min(MEDIAN.len() - 1)]
 }
 
 /// The typical square of a good reading, over one sigma's. `counts`: equations of each.
 #[must_use]
-pub fn level(squares: &[f64], counts: &[usize]) -> f64 {
+pub(crate) fn level(squares: &[f64], counts: &[usize]) -> f64 {
     let mut sorted: Vec<f64> =
         squares.iter().zip(counts).filter(|(_, count)| **count > 0).map(|(square, count)| square / median(*count)).collect();
     sorted.sort_by(f64::total_cmp);
@@ -34,7 +34,7 @@ pub fn level(squares: &[f64], counts: &[usize]) -> f64 {
 /// Weights of readings with these squared residuals, of so many equations each, in the order of measuring (Huber's, on the squares): one
 /// for all but rare ones, and for those that have neighbours like them ([`alone`]).
 #[must_use]
-pub fn weights(squares: &[f64], counts: &[usize]) -> Vec<f64> {
+pub(crate) fn weights(squares: &[f64], counts: &[usize]) -> Vec<f64> {
     let level = level(squares, counts);
     // Twice as far off counts a quarter, then less and less: an outlier tells nothing.
     let weight = |(square, count): (&f64, &usize)| {
@@ -54,7 +54,7 @@ pub fn weights(squares: &[f64], counts: &[usize]) -> Vec<f64> {
 /// Which of the rows that are `far` off are so by themselves: not in a run of neighbours, in the order of measuring, that is longer than
 /// chance would have it.
 #[must_use]
-pub fn alone(far: &[bool]) -> Vec<bool> {
+pub(crate) fn alone(far: &[bool]) -> Vec<bool> {
     let total = far.len() as f64;
     let share = far.iter().filter(|far| **far).count() as f64 / total.max(1.0);
     let mut alone = far.to_vec();

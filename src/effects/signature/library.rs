@@ -26,7 +26,7 @@ pub struct Hypothesis {
     pub spread: Vec<f64>,
     /// In words: harmonic order, source joint, shape without a name; empty where the kind says all.
     pub detail: String,
-    /// Of the prior of its kind at its place, the share that is its own; `None`: those that say nothing share alike what is left. A
+    /// Of the prior of its kind at its place, the share that is its own; `None`: one over the number of all of its kind there. A
     /// ripple found by a scan has that of one of all that were scanned.
     pub share: Option<f64>,
 }

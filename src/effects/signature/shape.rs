@@ -675,14 +675,22 @@ impl Shape {
     }
 }
 
+/// How well friction is known, as a share of it: no fit's to better than some hundredths; neither is the load.
+const FRICTION_KNOWN: f64 = 0.15;
+/// Keeps quotients finite where there is no load, N or N·m: far below any that seats something.
+const NO_LOAD: f64 = 1e-9;
+/// Sigmas of a load below which nobody knows to which side it seats something.
+const SIGMAS_UNDECIDED: f64 = 4.0;
+/// Share of all the load below which a base that is not level may decide instead: it leans by a degree or so.
+const SHARE_UNDECIDED: f64 = 0.02;
+
 /// The direction of a load that seats something, as far as it is known: shorter than one where the load is as small as the `sigma` of
 /// its components, so that a reading whose side nobody knows says little, and zero where friction up to `friction` holds.
 pub(super) fn seated(load: Vector3<f64>, sigma: f64, friction: f64) -> Vector3<f64> {
     let size = load.norm();
-    // No fit's friction is known to better than some hundredths; neither is the load.
-    let edge = libm::hypot(sigma, 0.15 * friction).max(1e-9);
+    let edge = libm::hypot(sigma, FRICTION_KNOWN * friction).max(NO_LOAD);
     let free = if friction > 0.0 { (0.5 + 0.5 * (size - friction) / edge).clamp(0.0, 1.0) } else { 1.0 };
-    load * free / libm::hypot(size, sigma).max(1e-9)
+    load * free / libm::hypot(size, sigma).max(NO_LOAD)
 }
 
 /// Two directions across `axis` that do not turn with the joint.
@@ -695,5 +703,5 @@ pub fn across(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
 
 /// Whether a load is too little to say which way it seats something: `sigma` of it, `all` that there is.
 pub(super) fn little(load: f64, sigma: f64, all: f64) -> bool {
-    load < f64::max(4.0 * sigma, 0.02 * all)
+    load < f64::max(SIGMAS_UNDECIDED * sigma, SHARE_UNDECIDED * all)
 }

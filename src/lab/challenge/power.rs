@@ -12,6 +12,7 @@ use crate::diagnosis::outcome::{Diagnosis, NoiseSource, Place};
 use crate::diagnosis::{Options as DiagnosisOptions, diagnose};
 use crate::effects::Kind;
 use crate::progress::{Silent, Steps};
+use crate::report::wording;
 use crate::scene::SceneFile;
 use crate::seed::hidden_stream;
 use crate::session::SessionError;
@@ -200,7 +201,8 @@ fn cell(public: &Public, effects: Vec<Effect>, key: &str) -> Result<Diagnosis, C
     let (measurements, _) = measure(&scene.cell(), &injected, planned, planned.len(), &mut Silent).map_err(SessionError::from)?;
     let rows: Vec<_> = measurements.iter().collect();
     let options = DiagnosisOptions::new(NoiseSource::Declared);
-    diagnose(&scene.arm, &scene.sensor, &rows, &options).map_err(|error| ChallengeError::Diagnosis { reason: error.to_string() })
+    let conclusion = diagnose(&scene.arm, &scene.sensor, &rows, &options);
+    conclusion.map(wording::diagnosis).map_err(|error| ChallengeError::Diagnosis { reason: error.to_string() })
 }
 
 /// What sets without an effect state about a kind: at its place, or at that in the middle of those where it would show.

@@ -2,10 +2,10 @@
 
 use serde_json::{Value, json};
 
-use super::table;
 use crate::effects::Kind;
 use crate::effects::catalogue::{needs, place, range};
 use crate::lab::effect_validation::{Line, MARK_M, MARK_POSES_PER_S, MARK_RELATIVE, MARK_SETTLING_M};
+use crate::report::table;
 use crate::scene::effect_file;
 use crate::units::number;
 

@@ -1,7 +1,7 @@
 //! What experiments found, for people as tables and for programs as CSV.
 
-use super::table;
 use crate::lab::reproduce::findings::{Claim, Data, Findings};
+use crate::report::table;
 use crate::units::number;
 
 /// The published numbers beside ours, the verdict, and what was assumed.

@@ -1,8 +1,8 @@
 //! What the physics says of a diagnosis, for people: the same waterfall from formulas and from the simulated arm.
 
-use super::diagnosis::place;
-use super::table;
 use crate::lab::confirm::{Answer, Confirmation};
+use crate::report::diagnosis::place;
+use crate::report::table;
 use crate::units::micrometres as um;
 
 /// The part of the report that comes under the diagnosis.

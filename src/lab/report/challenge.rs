@@ -1,8 +1,8 @@
 //! The score of a diagnosis: tables for people, one for CSV, and the reliability plot.
 
-use super::table;
 use crate::figure::{Axis, Colour, Estimate, Figure, Kind, Panel, Series};
 use crate::lab::challenge::score::{ANY, Confusion, LAMBDA, NOT_THERE, Restored, Score, Single};
+use crate::report::table;
 use crate::statistics::{median, share_interval95};
 
 /// `97 % (31/32)`.

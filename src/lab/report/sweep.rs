@@ -1,12 +1,12 @@
 //! What a sweep found: a table for people, tables for CSV, and a figure.
 
-use super::table;
 use crate::effects;
 use crate::figure::{Axis, Colour, Estimate, Figure, Kind, Panel, Series};
 use crate::lab::injection::units;
 use crate::lab::reproduce::findings::Data;
 use crate::lab::sweep::grid::{AS_THE_SCENE, NOTHING};
 use crate::lab::sweep::{Cell, CellSummary};
+use crate::report::table;
 use crate::statistics::Mean;
 use crate::units::number;
 

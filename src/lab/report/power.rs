@@ -1,9 +1,9 @@
 //! Stated and measured minimum detectable magnitudes: a table and a figure.
 
-use super::table;
 use crate::figure::{Axis, Colour, Estimate, Figure, Kind, Panel, Series};
 use crate::lab::challenge::power::{Curve, Report};
 use crate::lab::injection::units;
+use crate::report::table;
 use crate::statistics::share_interval95;
 use crate::units::number;
 
