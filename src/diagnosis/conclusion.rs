@@ -106,11 +106,13 @@ pub struct Remainder {
 /// A part of what no effect explains.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Remains {
-    /// A shape without a name.
+    /// Shapes without a name at one place.
     Shape {
-        /// What it is, as its hypothesis says.
+        /// What the first of them is, as its hypothesis says.
         detail: String,
-        /// RMS of what it does to positions, m.
+        /// How many more stand for the same.
+        besides: usize,
+        /// RMS of what they do to positions together, m.
         rms_m: f64,
     },
     /// So many more such shapes, all smaller.

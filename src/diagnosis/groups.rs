@@ -5,11 +5,11 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::conditions::centre;
-use crate::solver::robust::{median, rare};
 use super::settings::Noise;
 use crate::arm::frames::rotation_vector;
 use crate::measurement::Measurement;
 use crate::measurement::equations::{COMPONENTS, Equations};
+use crate::solver::robust::{median, rare};
 
 /// Rows of the same configuration.
 #[derive(Clone, Debug, PartialEq)]

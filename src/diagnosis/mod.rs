@@ -180,6 +180,13 @@ impl State {
         }
     }
 
+    /// Nothing found; rows that are far off from what geometry makes of the others count little, as what they pull awry hides all else.
+    fn robust(data: &Data<'_>) -> Result<State, DiagnosisError> {
+        let state = State::nominal(data);
+        let far = rows::first_fit(data.arm, data.sensor, data.measurements, &data.options.settings.model)?.far;
+        Ok(State { far: if far.is_empty() { state.far } else { far }, ..state })
+    }
+
     fn weights(&self) -> Vec<f64> {
         self.dependent.iter().zip(&self.far).map(|(a, b)| a * b).collect()
     }
@@ -264,7 +271,7 @@ impl Pass {
         let sensor = &Sensor { orientation_sigma_rad, ..data.sensor.clone() };
         let readings =
             Readings { sensor, measurements, weights: &weights, displacement: &state.displacement, scatter: &state.scatter };
-        let rows = rows::fit(data.arm, readings, &settings.model)?;
+        let rows = rows::fit(data.arm, readings)?;
         let (conditions, displaced) =
             conditions::conditions(measurements, &rows, &state.present, state.loads, state.upright.as_deref(), &settings.model);
         let mut candidates = data.options.candidates(&rows, &conditions, &state.ripples);
@@ -367,6 +374,8 @@ pub(crate) struct Analysis<'a> {
     pub(crate) held_out: Vec<HeldOut>,
     pub(crate) structure: open_set::Structure,
     pub(crate) outliers: outliers::Outliers,
+    /// Mean square of what is left of the readings that are no outliers, however little they count, in declared sigmas.
+    pub(crate) left: f64,
     /// Joints that do not repeat.
     pub(crate) scatter: Vec<Scatter>,
     /// Noise of the orientations over what was said of it.
@@ -420,6 +429,9 @@ pub fn diagnose(
             Block::Payload | Block::Session => validation.run(scheme, &linear.products(&scheme.fold, scheme.folds)),
         })
         .collect();
+    let counts = pass.rows.equations.counts();
+    let of_good = |of: &dyn Fn(usize) -> f64| (0..good.len()).filter(|row| good[*row]).map(of).sum::<f64>();
+    let left = of_good(&|row| pass.weighed.squares[row]) / of_good(&|row| counts[row] as f64).max(1.0);
     let units = data.groups.alike(measurements);
     let structure = open_set::structure(
         &pass.conditions,
@@ -442,6 +454,7 @@ pub fn diagnose(
         held_out,
         structure,
         outliers,
+        left,
         scatter: state.scatter.clone(),
         orientation: state.orientation,
         measurements,
@@ -458,7 +471,7 @@ pub fn diagnose(
 /// their own. The last pass, and what it was made around.
 fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
     let settings = &data.options.settings;
-    let mut state = State::nominal(data);
+    let mut state = State::robust(data)?;
     let sigma_m = data.sensor.mean_position_sigma(data.measurements.iter().copied());
     let (mut last, mut looks) = (settings.model.passes - 1, 0);
     // Without any scatter: held-out errors, and the state to go back to.
@@ -590,34 +603,32 @@ impl Singles {
     }
 }
 
-/// What is known of the noise: from repeats where there are any, else what is said.
+/// What is known of the noise: from repeats, from what is said, or, where repeats tell less than that, from both together.
 fn noise_prior(repeats: Option<Repeats>, declared_m: f64, source: NoiseSource, settings: &settings::Noise) -> NoisePrior {
-    match (repeats, source) {
-        (Some(repeats), _) => {
-            let level = (repeats.position_m / declared_m) * (repeats.position_m / declared_m);
-            // Without a move between them they say little about the arm.
-            NoisePrior {
-                degrees_of_freedom: repeats.degrees_of_freedom.min(if repeats.moved {
-                    settings.repeats_degrees
-                } else {
-                    settings.unmoved_degrees
-                }),
-                level,
-            }
-        }
-        (None, NoiseSource::Assumed) => NoisePrior { degrees_of_freedom: settings.assumed_degrees, level: 1.0 },
-        (None, NoiseSource::Declared | NoiseSource::Repeats) => {
-            NoisePrior { degrees_of_freedom: settings.declared_degrees, level: 1.0 }
-        }
+    let said = match source {
+        NoiseSource::Assumed => settings.assumed_degrees,
+        NoiseSource::Declared | NoiseSource::Repeats => settings.declared_degrees,
+    };
+    let Some(repeats) = repeats else {
+        return NoisePrior { degrees_of_freedom: said, level: 1.0 };
+    };
+    let level = (repeats.position_m / declared_m) * (repeats.position_m / declared_m);
+    if repeats.degrees_of_freedom < said {
+        let both = said + repeats.degrees_of_freedom;
+        return NoisePrior { degrees_of_freedom: both, level: (said + repeats.degrees_of_freedom * level) / both };
     }
+    // Without a move between them they say little about the arm.
+    let most = if repeats.moved { settings.repeats_degrees } else { settings.unmoved_degrees };
+    NoisePrior { degrees_of_freedom: repeats.degrees_of_freedom.min(most), level }
 }
 
 /// What members of a set do beyond what geometry absorbs.
 pub(crate) struct Moved {
     /// Of each row, which member moves it most.
     most: Vec<Option<usize>>,
-    /// Of each member, the 3-D RMS of what it does to the positions, m.
-    rms_m: Vec<f64>,
+    /// Of each place with shapes without a name: the first of these members, how many there are, and the 3-D RMS of what they do to the
+    /// positions together, m: where several stand for one cause, they may be far larger than it is.
+    unnamed: Vec<(usize, usize, f64)>,
 }
 
 fn moved(linear: &Linear<'_>, evidence: &Evidence<'_>, members: &[(usize, usize)]) -> Moved {
@@ -636,11 +647,20 @@ fn moved(linear: &Linear<'_>, evidence: &Evidence<'_>, members: &[(usize, usize)
         .collect();
     let square = |member: usize, row: usize| seen[member].rows_range(linear.rows.equations.of_position(row)).norm_squared();
     let most = |row: usize| (0..members.len()).max_by(|a, b| square(*a, row).total_cmp(&square(*b, row)));
-    let rms = |member: usize| {
-        let sum: f64 = (0..linear.count()).map(|row| square(member, row)).sum();
-        libm::sqrt(sum / linear.count().max(1) as f64)
-    };
-    Moved { most: (0..linear.count()).map(most).collect(), rms_m: (0..members.len()).map(rms).collect() }
+    let hypothesis = |member: usize| &evidence.candidates.hypotheses[members[member].0];
+    let mut unnamed: Vec<(usize, usize, f64)> = Vec::new();
+    for first in (0..members.len()).filter(|member| hypothesis(*member).kind.is_none()) {
+        let beside = |member: &usize| hypothesis(*member).kind.is_none() && hypothesis(*member).location == hypothesis(first).location;
+        if (0..first).any(|member| beside(&member)) {
+            continue;
+        }
+        let of_place: Vec<usize> = (first..members.len()).filter(beside).collect();
+        let together: DVector<f64> = of_place.iter().map(|member| &seen[*member]).sum();
+        let sum: f64 =
+            (0..linear.count()).map(|row| together.rows_range(linear.rows.equations.of_position(row)).norm_squared()).sum();
+        unnamed.push((first, of_place.len(), libm::sqrt(sum / linear.count().max(1) as f64)));
+    }
+    Moved { most: (0..linear.count()).map(most).collect(), unnamed }
 }
 
 /// What is left of each reading, in the measurement frame.

@@ -2,7 +2,7 @@
 //! mixture of two normal distributions, over a grid of shares and factors, against one), and which rows these are.
 
 use super::settings;
-use crate::solver::robust::{alone, level};
+use crate::solver::robust::{event, level};
 
 /// Of a 95 % interval, the standard deviations to either side, and their square, both to three digits.
 const Z95: f64 = 1.96;
@@ -23,33 +23,36 @@ pub(crate) struct Outliers {
     pub(crate) rows: Vec<usize>,
 }
 
-/// The evidence for outliers among readings with these squared residuals, of so many equations each.
+/// The evidence for outliers among readings with these squared residuals, of so many equations each, in the order of measuring.
+/// Neighbours that are far off together ([`event`]) are none, whatever they are.
 #[must_use]
 pub(crate) fn look(squares: &[f64], counts: &[usize], settings: &settings::Outliers) -> Outliers {
     let level = level(squares, counts);
-    let density =
-        |(square, count): (f64, usize), scale: f64| libm::exp(-0.5 * square / scale) / libm::pow(scale, 0.5 * count as f64);
-    let readings: Vec<(f64, usize)> = squares.iter().copied().zip(counts.iter().copied()).collect();
+    // Logarithms: a reading that is a metre off has a density of nothing.
+    let log_density = |(square, count): (f64, usize), scale: f64| -0.5 * square / scale - 0.5 * count as f64 * libm::log(scale);
+    let event = event(squares, counts);
+    let rows: Vec<usize> = (0..squares.len()).filter(|row| !event[*row]).collect();
+    let readings: Vec<(f64, usize)> = rows.iter().map(|row| (squares[*row], counts[*row])).collect();
     let steps = i32::from(settings.level_steps);
     let around = |level: f64| (-steps..=steps).map(move |step| level * libm::exp(settings.level_step * f64::from(step)));
     let scales: Vec<f64> = around(level).collect();
     let total = |share: f64, factor: f64| {
         // The level is not known well: averaged.
         let of_scale = |scale: &f64| {
-            readings
-                .iter()
-                .map(|one| {
-                    libm::log((1.0 - share) * density(*one, *scale) + share * density(*one, scale * factor * factor) + 1e-300)
-                })
-                .sum::<f64>()
+            let mixed = |one: &(f64, usize)| {
+                let near = libm::log(1.0 - share) + log_density(*one, *scale);
+                let far = libm::log(share) + log_density(*one, scale * factor * factor);
+                near.max(far) + libm::log1p(libm::exp(-(near - far).abs()))
+            };
+            readings.iter().map(mixed).sum::<f64>()
         };
         log_mean(&scales.iter().map(of_scale).collect::<Vec<_>>())
     };
     // Without outliers the level is that of all.
-    let mean = squares.iter().sum::<f64>() / counts.iter().sum::<usize>() as f64;
-    let plain: Vec<f64> = around(mean.max(1e-12))
-        .map(|scale| readings.iter().map(|one| libm::log(density(*one, scale) + 1e-300)).sum::<f64>())
-        .collect();
+    let equations: usize = readings.iter().map(|(_, count)| count).sum();
+    let mean = readings.iter().map(|(square, _)| square).sum::<f64>() / equations.max(1) as f64;
+    let plain: Vec<f64> =
+        around(mean.max(1e-12)).map(|scale| readings.iter().map(|one| log_density(*one, scale)).sum::<f64>()).collect();
     let plain = log_mean(&plain);
     let grid: Vec<(f64, f64, f64)> = settings
         .shares
@@ -61,21 +64,22 @@ pub(crate) fn look(squares: &[f64], counts: &[usize], settings: &settings::Outli
     let (share, factor, _) = grid.iter().copied().max_by(|a, b| a.2.total_cmp(&b.2)).unwrap_or((0.0, 1.0, 0.0));
     let probability = 1.0 / (1.0 + libm::exp(-log_odds));
     let responsible = |one: (f64, usize)| {
-        let (far, near) = (share * density(one, level * factor * factor), (1.0 - share) * density(one, level));
-        if far + near > 0.0 { far / (far + near) } else { 1.0 }
+        let near = libm::log(1.0 - share) + log_density(one, level);
+        let far = libm::log(share) + log_density(one, level * factor * factor);
+        1.0 / (1.0 + libm::exp(near - far))
     };
-    let rows: Vec<usize> = if probability < settings.there {
+    let (n, expected) = (readings.len().max(1) as f64, readings.iter().map(|one| responsible(*one)).sum::<f64>());
+    let found: Vec<usize> = if probability < settings.there {
         Vec::new()
     } else {
-        (0..squares.len()).filter(|row| responsible(readings[*row]) > settings.row).collect()
+        rows.iter().zip(&readings).filter(|(_, one)| responsible(**one) > settings.row).map(|(row, _)| *row).collect()
     };
-    let (n, expected) = (squares.len() as f64, readings.iter().map(|one| responsible(*one)).sum::<f64>());
     // Some of them are hidden among the good ones; the count is binomial (Wilson's interval).
     let p = expected / n;
     let z2 = Z95_SQUARED;
     let middle = (p + z2 / (2.0 * n)) / (1.0 + z2 / n);
     let half = Z95 / (1.0 + z2 / n) * libm::sqrt(p * (1.0 - p) / n + z2 / (4.0 * n * n));
-    Outliers { probability, share: p, share_ci95: [(middle - half).max(0.0), (middle + half).min(1.0)], factor, rows }
+    Outliers { probability, share: p, share_ci95: [(middle - half).max(0.0), (middle + half).min(1.0)], factor, rows: found }
 }
 
 fn log_mean(values: &[f64]) -> f64 {
@@ -86,31 +90,7 @@ fn log_mean(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::distribution::chi_squared_tail;
     use crate::seed::stream;
-
-    /// Both tables against the distribution itself.
-    #[test]
-    fn one_square_in_a_thousand_is_rare_and_half_of_them_are_below_the_median() {
-        for equations in 1..=6 {
-            let tail = |value: f64| chi_squared_tail(value, equations as f64);
-            assert!((tail(rare(equations)) - 1e-3).abs() < 1e-5, "{equations}: {}", tail(rare(equations)));
-            assert!((tail(median(equations)) - 0.5).abs() < 2e-4, "{equations}: {}", tail(median(equations)));
-        }
-    }
-
-    /// However large the noise is that all share, a reading twice as far off as is rare counts a sixteenth: its square is four times too
-    /// large.
-    #[test]
-    fn weights_do_not_hang_on_the_unit_of_the_noise() {
-        for unit in [1e-3, 1.0, 50.0] {
-            let mut squares = vec![median(3) * unit; 20];
-            squares.extend([4.0 * rare(3) * unit, rare(3) * unit]);
-            let found = weights(&squares, &[3; 22]);
-            assert!(found[..20].iter().all(|weight| *weight == 1.0));
-            assert!((found[20] - 1.0 / 16.0).abs() < 1e-12 && (found[21] - 1.0).abs() < 1e-9, "{found:?}");
-        }
-    }
 
     /// Squares of `count` readings of three numbers each; every `every`-th has a noise that is `factor` times as large.
     fn squares(count: usize, every: usize, factor: f64) -> Vec<f64> {
@@ -126,6 +106,24 @@ mod tests {
         assert!(found.share_ci95[0] < 0.05 && 0.05 < found.share_ci95[1], "{found:?}");
         // A wild reading may lie where good ones do; no good one is taken for wild.
         assert!(found.rows.iter().all(|row| row % 20 == 3) && found.rows.len() >= 8, "{found:?}");
+    }
+
+    /// However far off they are.
+    #[test]
+    fn readings_that_are_a_metre_off_are_found() {
+        for factor in [100.0, 2e4] {
+            let found = look(&squares(160, 20, factor), &[3; 160], &settings::Outliers::default());
+            assert!(found.probability > 0.999, "{found:?}");
+            assert_eq!(found.rows, (0..160).filter(|row| row % 20 == 3).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn a_block_of_neighbours_that_are_far_off_is_no_outlier() {
+        let mut of = squares(200, 1000, 1.0);
+        of[160..].iter_mut().for_each(|square| *square += 1e6);
+        let found = look(&of, &[3; 200], &settings::Outliers::default());
+        assert!(found.probability < 0.1 && found.rows.is_empty(), "{found:?}");
     }
 
     #[test]

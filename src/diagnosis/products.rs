@@ -17,8 +17,6 @@ use crate::numerics::gram;
 #[derive(Debug)]
 pub(crate) struct Products {
     folds: Vec<Fold>,
-    /// Whitened signatures, fold below fold.
-    signatures: DMatrix<f64>,
     geometry: usize,
     /// Columns of each hypothesis.
     columns: Vec<Range<usize>>,
@@ -31,8 +29,8 @@ pub(crate) struct Products {
 /// The rows of one fold.
 #[derive(Debug)]
 struct Fold {
-    /// Its equations among the rows of the signatures.
-    range: Range<usize>,
+    /// Whitened signatures.
+    signatures: DMatrix<f64>,
     /// Of the geometry.
     normal: DMatrix<f64>,
     /// Of the geometry with signatures and, last, the residual.
@@ -57,10 +55,9 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7])) + rest
 }
 
-/// Sums of products of `own` with the rows `range` of every column of `matrix`, added to `sums`: four columns at a time, as `own` is read
-/// once for all of them.
-fn add_dots(own: &[f64], matrix: &DMatrix<f64>, range: &Range<usize>, sums: &mut [f64]) {
-    let part = |number: usize| &column(matrix, number)[range.clone()];
+/// Sums of products of `own` with every column of `matrix`, added to `sums`: four columns at a time, as `own` is read once for all of them.
+fn add_dots(own: &[f64], matrix: &DMatrix<f64>, sums: &mut [f64]) {
+    let part = |number: usize| column(matrix, number);
     let mut blocks = sums.chunks_exact_mut(4);
     let mut number = 0;
     for block in &mut blocks {
@@ -129,20 +126,8 @@ impl Products {
             let own_rows: Vec<usize> = (0..fold.len()).filter(|row| fold[*row] == number).collect();
             Fold::new(rows, readings, candidates, residual, &own_rows, &columns, count)
         };
-        let parts: Vec<(Fold, DMatrix<f64>)> = (0..folds).into_par_iter().map(of_fold).collect();
-        let equations = parts.iter().map(|(_, part)| part.nrows()).sum();
-        let mut signatures = DMatrix::zeros(equations, columns.last().map_or(0, |last| last.end));
-        let mut first = 0;
-        let folds = parts
-            .into_iter()
-            .map(|(fold, part)| {
-                let range = first..first + part.nrows();
-                signatures.rows_mut(first, part.nrows()).copy_from(&part);
-                first = range.end;
-                Fold { range, ..fold }
-            })
-            .collect();
-        Products { folds, signatures, geometry: rows.jacobian.ncols(), columns, first_own, rows: RwLock::default() }
+        let folds = (0..folds).into_par_iter().map(of_fold).collect();
+        Products { folds, geometry: rows.jacobian.ncols(), columns, first_own, rows: RwLock::default() }
     }
 
     fn width(&self) -> usize {
@@ -159,8 +144,7 @@ impl Products {
         let width = self.width();
         let mut row = vec![0.0; width * self.folds.len()];
         for (fold, sums) in self.folds.iter().zip(row.chunks_exact_mut(width.max(1))) {
-            let own = &column(&self.signatures, number)[fold.range.clone()];
-            add_dots(own, &self.signatures, &fold.range, sums);
+            add_dots(column(&fold.signatures, number), &fold.signatures, sums);
         }
         let row = Arc::new(row);
         if let Ok(mut known) = self.rows.write() {
@@ -179,7 +163,7 @@ impl Fold {
         own_rows: &[usize],
         columns: &[Range<usize>],
         count: f64,
-    ) -> (Fold, DMatrix<f64>) {
+    ) -> Fold {
         let orientation = rows.equations.has_orientation();
         let (geometry, width) = (rows.jacobian.ncols(), columns.last().map_or(0, |last| last.end));
         let equations = own_rows.iter().map(|row| rows.equations.of(*row).len()).sum();
@@ -230,7 +214,7 @@ impl Fold {
         // A row that counts half is half an equation.
         let weight = |row: &usize| count * rows.equations.of(*row).len() as f64 * rows.whitening.weights()[*row];
         let equations = own_rows.iter().map(weight).sum();
-        (Fold { range: 0..0, residual: dot(&left, &left), normal, mixed, own, with_residual, equations }, signatures)
+        Fold { residual: dot(&left, &left), signatures, normal, mixed, own, with_residual, equations }
     }
 }
 
@@ -360,8 +344,9 @@ impl<'a> Marginal<'a> {
             }
         } else {
             // Of many columns, which no fold asks for.
-            let all = &self.products.signatures;
-            add_dots(column(all, number), all, &(0..all.nrows()), &mut row);
+            for fold in &self.products.folds {
+                add_dots(column(&fold.signatures, number), &fold.signatures, &mut row);
+            }
         }
         let mixed = column(&self.mixed, number);
         for (other, value) in row.iter_mut().enumerate() {
@@ -450,7 +435,7 @@ pub(super) fn test_marginal(candidates: &Candidates, signatures: &DMatrix<f64>, 
     }
     let width = signatures.ncols();
     let fold = Fold {
-        range: 0..signatures.nrows(),
+        signatures: signatures.clone(),
         normal: DMatrix::zeros(0, 0),
         mixed: DMatrix::zeros(0, width + 1),
         own,
@@ -460,7 +445,6 @@ pub(super) fn test_marginal(candidates: &Candidates, signatures: &DMatrix<f64>, 
     };
     TestProducts(Products {
         folds: vec![fold],
-        signatures: signatures.clone(),
         geometry: 0,
         columns,
         first_own,

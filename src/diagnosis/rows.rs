@@ -14,6 +14,7 @@ use crate::effects::signature::shape::Displacement;
 use crate::identification::geometry::{self, GeometryError};
 use crate::measurement::equations::Equations;
 use crate::measurement::{Measurement, Sensor};
+use crate::solver::robust;
 use crate::solver::whitening::Whitening;
 
 /// Why nothing can be diagnosed.
@@ -67,6 +68,10 @@ pub(crate) struct Rows {
     pub(crate) jacobian: DMatrix<f64>,
     /// The fitted parameters over the sigmas of their priors.
     pub(crate) parameters: DVector<f64>,
+    /// Weight of each row for being far off from what geometry alone makes of the others.
+    pub(crate) far: Vec<f64>,
+    /// Largest error of a frame along an axis (m) and about one (rad).
+    pub(crate) largest_errors: [f64; 2],
     /// Which parameters are free (base and target).
     pub(crate) free: Vec<bool>,
     /// What is worth knowing about the sessions.
@@ -140,39 +145,61 @@ pub(crate) fn check_robot(
     measurements: &[&Measurement],
     settings: &Model,
 ) -> Result<(), DiagnosisError> {
-    let weights = vec![1.0; measurements.len()];
-    match fit(arm, Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[] }, settings) {
+    match first_fit(arm, sensor, measurements, settings) {
         Ok(_) | Err(DiagnosisError::Geometry(_)) => Ok(()),
         Err(wrong) => Err(wrong),
     }
 }
 
-/// Fits base, target and geometry of `arm` to `readings`. Sessions get bases of their own where that is worth it.
+/// Fits `arm` alone to `measurements`, and refuses those that are none of its. What effects and geometry do together later is no reason to
+/// doubt the robot.
 ///
 /// # Errors
-/// If the measurements cannot tell.
-pub(crate) fn fit(arm: &Arm, readings: Readings<'_>, settings: &Model) -> Result<Rows, DiagnosisError> {
-    let Readings { sensor, measurements, weights, displacement, scatter } = readings;
-    let scatter: Vec<(usize, f64)> = scatter.iter().map(|one| (one.joint, one.sigma)).collect();
-    let fitted = geometry::fit(arm, geometry::Readings { sensor, measurements, weights, displacement, scatter: &scatter })?;
+/// If the measurements cannot tell, or are not this robot's.
+pub(crate) fn first_fit(
+    arm: &Arm,
+    sensor: &Sensor,
+    measurements: &[&Measurement],
+    settings: &Model,
+) -> Result<Rows, DiagnosisError> {
+    let weights = vec![1.0; measurements.len()];
+    let rows = fit(arm, Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[] })?;
     let mechanism = Mechanism::new(arm);
     let reach: f64 = mechanism.segments.iter().map(|segment| segment.translation.vector.norm()).sum();
-    let equations = &fitted.equations;
-    let of_position = |row: usize| fitted.residual.rows_range(equations.of_position(row)).norm_squared();
-    let squares: f64 = (0..equations.readings()).map(of_position).sum();
-    let rms = libm::sqrt(squares / measurements.len() as f64);
+    let equations = &rows.equations;
+    let of_position = |row: usize| rows.residual.rows_range(equations.of_position(row)).norm_squared();
+    let near: Vec<usize> =
+        (0..equations.readings()).filter(|row| rows.far.get(*row).is_none_or(|weight| *weight >= robust::FAR)).collect();
+    // Readings that are far off are not the robot's doing while they are few.
+    let counted = if near.len() as f64 >= settings.of_this_robot * equations.readings() as f64 {
+        near
+    } else {
+        (0..equations.readings()).collect()
+    };
+    let rms = libm::sqrt(counted.iter().map(|row| of_position(*row)).sum::<f64>() / counted.len() as f64);
     if rms.is_nan() || rms >= settings.astray * reach.max(settings.small_arm_m) {
         return Err(DiagnosisError::NotThisRobot { rms_mm: rms * 1e3, hint: mistake::hint(arm, measurements, settings.mended) });
     }
-    if fitted.parameters().amax() > settings.implausible {
-        let [shift, turn] = fitted.largest_errors();
+    if rows.parameters.amax() > settings.implausible {
+        let [shift, turn] = rows.largest_errors;
         return Err(DiagnosisError::NotThisGeometry {
             shift_mm: shift * 1e3,
             turn_deg: turn.to_degrees(),
             hint: mistake::hint(arm, measurements, settings.mended),
         });
     }
-    let mechanism = mechanism.with_chain(fitted.root_to_tool());
+    Ok(rows)
+}
+
+/// Fits base, target and geometry of `arm` to `readings`. Sessions get bases of their own where that is worth it.
+///
+/// # Errors
+/// If the measurements cannot tell.
+pub(crate) fn fit(arm: &Arm, readings: Readings<'_>) -> Result<Rows, DiagnosisError> {
+    let Readings { sensor, measurements, weights, displacement, scatter } = readings;
+    let scatter: Vec<(usize, f64)> = scatter.iter().map(|one| (one.joint, one.sigma)).collect();
+    let fitted = geometry::fit(arm, geometry::Readings { sensor, measurements, weights, displacement, scatter: &scatter })?;
+    let mechanism = Mechanism::new(arm).with_chain(fitted.root_to_tool());
     let postures: Vec<Posture> =
         measurements.iter().map(|row| mechanism.posture(&row.joints, row.payload_kg.unwrap_or(0.0))).collect();
     let places = fitted.tool_from_target();
@@ -187,12 +214,14 @@ pub(crate) fn fit(arm: &Arm, readings: Readings<'_>, settings: &Model) -> Result
         mechanism,
         turn: fitted.session.iter().map(|session| turns[*session]).collect(),
         parameters: fitted.parameters().clone(),
+        largest_errors: fitted.largest_errors(),
         postures,
         targets,
         equations: fitted.equations,
         residual: fitted.residual,
         whitening: fitted.whitening,
         jacobian: fitted.jacobian,
+        far: fitted.far,
         free: fitted.free,
         notes: fitted.notes,
     })

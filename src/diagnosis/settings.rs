@@ -197,6 +197,8 @@ settings! {
         implausible: f64 = 12.0 => 1.0..=MANY,
         /// What remains (RMS) over the arm's reach beyond which it is another robot.
         astray: f64 = 0.05 => 1e-6..=MANY,
+        /// Share of the readings that must not be far off from what geometry makes of the others, so that the others are judged without them.
+        of_this_robot: f64 = 0.6 => SHARE,
         /// Change of a temperature within the session below which no thermal effect can be looked for, K.
         temperature_k: f64 = 0.05 => 0.0..=100.0,
         /// Reach below which an arm counts as one of this reach there, m.
@@ -279,9 +281,9 @@ settings! {
         /// The same beside something unknown: a misfit has tails, too.
         factor_beside_unknown: f64 = 9.0 => 1.0..=MANY,
         /// Shares of the readings that are tried, each as likely.
-        shares: Vec<f64> = vec![0.02, 0.03, 0.05, 0.08, 0.12, 0.18] => 1e-6..=0.999,
+        shares: Vec<f64> = vec![0.02, 0.03, 0.05, 0.08, 0.12, 0.18, 0.3] => 1e-6..=0.999,
         /// Their noise over that of the others that is tried, each as likely.
-        factors: Vec<f64> = vec![4.0, 6.0, 9.0, 14.0, 20.0] => 1.0..=MANY,
+        factors: Vec<f64> = vec![4.0, 6.0, 9.0, 14.0, 20.0, 40.0, 100.0, 300.0, 1e3, 1e4] => 1.0..=MANY,
         /// The mean square of good readings is not known well and is averaged over: from value to value its logarithm goes on by so much.
         level_step: f64 = 0.08 => 1e-6..=10.0,
         /// Steps of it to either side of what it looks like.

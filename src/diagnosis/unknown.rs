@@ -19,16 +19,22 @@ pub(super) fn unknown(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFl
     // A sensor may be somewhat worse than it says, not this much.
     let known = !matches!(noise_floor.source, NoiseSource::Assumed);
     let over = noise_floor.position_m / analysis.sigma_m();
-    let excess = known && level > decision.excess * over * over;
+    // Nor may readings be ever so far off that count for little, and are no outliers.
+    let usual = over * over;
+    let excess = known && (level > decision.excess * usual || analysis.left > analysis.options.settings.noise.no_noise * usual);
     let scatters = !analysis.scatter.is_empty();
     let present = of_nameless >= decision.named || structured || excess || scatters;
     let mut remains: Vec<Remains> = Vec::new();
     if present {
-        let members = analysis.found.best.iter().map(|(hypothesis, _)| &analysis.evidence.candidates.hypotheses[*hypothesis]);
-        let mut unnamed: Vec<_> = members.zip(&analysis.moved.rms_m).filter(|(of, _)| of.kind.is_none()).collect();
-        unnamed.sort_by(|a, b| b.1.total_cmp(a.1));
+        let detail = |member: usize| &analysis.evidence.candidates.hypotheses[analysis.found.best[member].0].detail;
+        let mut unnamed = analysis.moved.unnamed.clone();
+        unnamed.sort_by(|a, b| b.2.total_cmp(&a.2));
         let largest = unnamed.iter().take(decision.unknown_said);
-        remains.extend(largest.map(|(of, rms_m)| Remains::Shape { detail: of.detail.clone(), rms_m: **rms_m }));
+        remains.extend(largest.map(|(first, count, rms_m)| Remains::Shape {
+            detail: detail(*first).clone(),
+            besides: count - 1,
+            rms_m: *rms_m,
+        }));
         if unnamed.len() > decision.unknown_said {
             remains.push(Remains::Smaller { count: unnamed.len() - decision.unknown_said });
         }
@@ -108,11 +114,13 @@ mod tests {
             let claim = (None, all[six[0]].location);
             analysis.found.claims = vec![Belief { claim, hypothesis: six[0], probability: 0.8 }];
             analysis.found.best = six.iter().map(|number| (*number, 1)).collect();
-            analysis.moved = Moved { most: Vec::new(), rms_m: vec![1e-6, 6e-6, 3e-6, 5e-6, 2e-6, 4e-6] };
+            let sizes = [1e-6, 6e-6, 3e-6, 5e-6, 2e-6, 4e-6];
+            let unnamed = sizes.iter().enumerate().map(|(member, size)| (member, 1, *size)).collect();
+            analysis.moved = Moved { most: Vec::new(), unnamed };
         };
         let found = ask(unnamed, 1.0, NoiseSource::Declared);
         assert!(found.present && (found.p_value - 0.2).abs() < 1e-12);
-        let shape = |number: usize, rms_m: f64| Remains::Shape { detail: details[number].clone(), rms_m };
+        let shape = |number: usize, rms_m: f64| Remains::Shape { detail: details[number].clone(), besides: 0, rms_m };
         assert_eq!(
             found.remains,
             [shape(1, 6e-6), shape(3, 5e-6), shape(5, 4e-6), shape(2, 3e-6), Remains::Smaller { count: 2 }]

@@ -45,12 +45,12 @@ pub(super) fn conclude(analysis: &Analysis<'_>) -> Conclusion {
     }
 }
 
-/// The noise of the sensor: from repeats where there are any.
+/// The noise of the sensor: from repeats where there are enough, else as is said and as few repeats change it.
 fn noise_floor(analysis: &Analysis<'_>) -> NoiseFloor {
-    let (position_m, source) = match analysis.repeats {
-        Some(repeats) => (repeats.position_m, NoiseSource::Repeats),
-        None => (analysis.sigma_m(), analysis.options.noise),
-    };
+    let prior = analysis.evidence.noise;
+    let told = analysis.repeats.is_some_and(|repeats| repeats.degrees_of_freedom >= prior.degrees_of_freedom);
+    let source = if told { NoiseSource::Repeats } else { analysis.options.noise };
+    let position_m = analysis.sigma_m() * libm::sqrt(prior.level);
     // In the same proportion to that of the positions as what is left of them.
     let proportion = position_m / analysis.sigma_m();
     let rotation_rad = analysis

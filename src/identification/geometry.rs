@@ -13,7 +13,7 @@ use crate::arm::{Arm, ChainAt};
 use crate::measurement::equations::{COMPONENTS, Equations};
 use crate::measurement::{Measurement, Sensor};
 use crate::solver::whitening::Whitening;
-use crate::solver::{Linearised, Problem, Stop, solve};
+use crate::solver::{Fit, Linearised, Problem, Stop, robust, solve};
 
 /// One sigma of a joint frame's position, m: machining and assembly are better than this.
 pub const FRAME_SHIFT: f64 = 5e-3;
@@ -25,6 +25,12 @@ pub const FREE: f64 = 50e-3;
 const CONFIGURATIONS: usize = 6;
 /// Steps that place base and target, and steps of the whole fit.
 const STEPS: [usize; 2] = [30, 60];
+/// Rounds of fitting and weighing where readings are far off or the noise is not as declared.
+const ROUNDS: usize = 12;
+/// Mean square of what is left, in declared sigmas, from which on it is taken for the noise in what the prior counts for.
+const LEVEL: f64 = 2.25;
+/// Change of a row's weight, and relative change of the level, that is nothing.
+const SETTLED: f64 = 0.05;
 /// Smallest sigma of a reading, m or rad: what is declared exact is taken to a nanometre or nanoradian.
 const SMALLEST_SIGMA: f64 = 1e-9;
 /// Improvement over the noise's mean square, by parameter, from which on sessions have bases of their own (an F value).
@@ -101,6 +107,8 @@ pub struct Geometry {
     pub jacobian: DMatrix<f64>,
     /// Which parameters are free (base and target).
     pub free: Vec<bool>,
+    /// Weight of each row beside those asked for: less than one where it is far off from what the others say.
+    pub far: Vec<f64>,
     /// Sum of squares of whitened residuals and of the prior's pull.
     pub cost: f64,
     /// Why the fit ended.
@@ -212,19 +220,22 @@ fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], sessions: Vec<
     let of_free: Vec<usize> = (0..free.len()).filter(|column| free[*column]).collect();
     let all: Vec<usize> = (0..free.len()).collect();
     // Base and target first: what is fitted with them far off would throw the frames about.
-    let placed = solve(&problem, &of_free, start, STEPS[0]).point;
+    let placed = problem.robustly(&of_free, start, STEPS[0]).point;
     problem.whiten(&placed);
-    let mut fit = solve(&problem, &all, placed, STEPS[1]);
+    let mut fit = problem.robustly(&all, placed, STEPS[1]);
     let mut steps = fit.steps;
     if !readings.scatter.is_empty() {
         // What scatter does was that of the nominal arm.
         problem.whiten(&fit.point);
-        fit = solve(&problem, &all, fit.point, STEPS[1]);
+        fit = problem.robustly(&all, fit.point, STEPS[1]);
         steps += fit.steps;
     }
+    let far = std::mem::take(&mut problem.far);
+    problem.whiten(&fit.point);
     let (residual, jacobian) = problem.raw(&fit.point);
     Ok(Geometry {
-        cost: fit.linearised.cost(),
+        far,
+        cost: problem.level * fit.linearised.cost(),
         stop: fit.stop,
         steps,
         placed: fit.point,
@@ -283,6 +294,11 @@ struct Placing<'a> {
     free: Vec<bool>,
     /// Of each column's prior, m or rad.
     sigma: Vec<f64>,
+    /// Weight of each row for being far off; empty for one.
+    far: Vec<f64>,
+    /// Mean square of the noise over the declared one: the prior's sigmas are true ones, so that they count for more where the noise is
+    /// larger than declared.
+    level: f64,
 }
 
 impl<'a> Placing<'a> {
@@ -311,7 +327,22 @@ impl<'a> Placing<'a> {
         let free: Vec<bool> = (0..width).map(|column| !(before..before + count).contains(&column)).collect();
         let sigma = (0..width).map(|column| if free[column] { FREE } else { sigma_of_frame(column - before) }).collect();
         let whitening = Whitening::new(&equations, inverse_sigmas(&equations), readings.weights);
-        Ok(Placing { frames, readings, session, targets, target, equations, whitening, bases, per_target, free, sigma })
+        let (far, level) = (Vec::new(), 1.0);
+        Ok(Placing {
+            frames,
+            readings,
+            session,
+            targets,
+            target,
+            equations,
+            whitening,
+            bases,
+            per_target,
+            free,
+            sigma,
+            far,
+            level,
+        })
     }
 
     /// Where base and target are before anything is fitted.
@@ -408,9 +439,42 @@ impl<'a> Placing<'a> {
         (residual, jacobian)
     }
 
+    /// Fits `columns` from `start`, weighs the rows by what is left and estimates the noise, until that changes no more. Where no row is far
+    /// off and the noise is as declared, this is one least squares.
+    fn robustly(&mut self, columns: &[usize], start: Placed, most: usize) -> Fit<Placed> {
+        let mut fit = solve(self, columns, start, most);
+        let counts = self.equations.counts();
+        for _ in 0..ROUNDS {
+            let left = self.raw(&fit.point).0;
+            let sensor = Whitening::new(&self.equations, inverse_sigmas(&self.equations), &vec![1.0; counts.len()]);
+            let whitened = sensor.of_vector(&left);
+            let squares: Vec<f64> =
+                (0..counts.len()).map(|row| whitened.rows_range(self.equations.of(row)).norm_squared()).collect();
+            let mut far = robust::weights(&squares, &counts);
+            far.iter_mut().filter(|weight| **weight >= robust::FAR).for_each(|weight| *weight = 1.0);
+            let level = robust::level(&squares, &counts);
+            // While the frames are held, no prior counts.
+            let level = if level > LEVEL && columns.len() == self.free.len() { level } else { 1.0 };
+            let before = |row: usize| self.far.get(row).copied().unwrap_or(1.0);
+            let same = far.iter().enumerate().all(|(row, weight)| (weight - before(row)).abs() < SETTLED)
+                && (level / self.level - 1.0).abs() < SETTLED;
+            if same {
+                break;
+            }
+            (self.far, self.level) = (far, level);
+            self.whiten(&fit.point);
+            let steps = fit.steps;
+            fit = solve(self, columns, fit.point, most);
+            fit.steps += steps;
+        }
+        fit
+    }
+
     /// Whitens with what scatter does about `placed`.
     fn whiten(&mut self, placed: &Placed) {
-        let whitening = Whitening::new(&self.equations, inverse_sigmas(&self.equations), self.readings.weights);
+        let far = |row: usize| self.far.get(row).copied().unwrap_or(1.0);
+        let weights: Vec<f64> = self.readings.weights.iter().enumerate().map(|(row, weight)| weight * far(row)).collect();
+        let whitening = Whitening::new(&self.equations, inverse_sigmas(&self.equations), &weights);
         if self.readings.scatter.is_empty() {
             self.whitening = whitening;
             return;
@@ -439,9 +503,10 @@ impl Problem for Placing<'_> {
 
     fn linearise(&self, at: &Placed) -> Linearised {
         let (residual, jacobian) = self.raw(at);
+        let sigma = libm::sqrt(self.level);
         Linearised {
-            residuals: self.whitening.of_vector(&residual),
-            jacobian: self.whitening.of(&jacobian),
+            residuals: self.whitening.of_vector(&residual) / sigma,
+            jacobian: self.whitening.of(&jacobian) / sigma,
             departures: Some(at.parameters.clone()),
         }
     }

@@ -12,12 +12,14 @@ use crate::measurement::{Measurement, Role, Sensor, Weights};
 use crate::numerics;
 use crate::quality::subspace::Subspace;
 use crate::seed::stream;
-use crate::solver::{Problem, solve};
+use crate::solver::{Problem, robust, solve};
 
 /// Configurations beside the measured ones at which the arm's own parameters must put the target where the fitted geometry has it.
 const SAMPLES: usize = 60;
 /// Largest distance (m) by which they may miss it.
 const EXPRESSED: f64 = 1e-9;
+/// Readings that are far off of which the number is said, at most.
+const FAR_SAID: usize = 12;
 /// A combination whose standard error is above this share of what was known of it beforehand is told by that, not by the data.
 const HARDLY_SEEN: f64 = 0.5;
 
@@ -25,6 +27,8 @@ const HARDLY_SEEN: f64 = 0.5;
 /// is the same arm in the measurement frame with base and target fitted alone ([`super::alignment::align`]), whose parameters are
 /// reported. Sessions may have bases of their own, and several targets may be read; the parameters of base and target are then those
 /// of the first.
+///
+/// Readings that are far off from what the others say together (by the median of all) are left out, and named in the notes.
 ///
 /// Parameters that the data hardly show stay near their nominal values, for a prior says how far an arm of this kind is off; the notes
 /// name them.
@@ -38,6 +42,53 @@ pub fn identify_real(
     measurements: &[Measurement],
 ) -> Result<Identification, IdentificationError> {
     check_joints(robot, measurements)?;
+    let far = far_off(robot, sensor, measurements)?;
+    if far.is_empty() {
+        return identify_good(robot, aligned, sensor, measurements, Vec::new());
+    }
+    let good: Vec<Measurement> =
+        measurements.iter().enumerate().filter(|(at, _)| !far.iter().any(|(row, _)| row == at)).map(|(_, row)| row.clone()).collect();
+    let said = |(row, off): &(usize, f64)| format!("{} ({:.1} mm)", measurements[*row].index + 1, off * 1e3);
+    let mut list: Vec<String> = far.iter().take(FAR_SAID).map(said).collect();
+    if far.len() > FAR_SAID {
+        list.push(format!("{} more", far.len() - FAR_SAID));
+    }
+    let note = format!(
+        "{} of {} readings are far off from what the others say and were left out: number {}",
+        far.len(),
+        measurements.len(),
+        list.join(", ")
+    );
+    identify_good(robot, aligned, sensor, &good, vec![note])
+}
+
+/// Rows of `measurements` that are far off from what the fitted ones say together, and by how much (m).
+fn far_off(robot: &Arm, sensor: &Sensor, measurements: &[Measurement]) -> Result<Vec<(usize, f64)>, IdentificationError> {
+    let fit: Vec<&Measurement> = measurements.iter().filter(|row| row.role == Role::Fit).collect();
+    let weights = vec![1.0; fit.len()];
+    let readings = Readings { sensor, measurements: &fit, weights: &weights, displacement: &[], scatter: &[] };
+    let geometry = geometry::fit(robot, readings)?;
+    let all: Vec<&Measurement> = measurements.iter().collect();
+    let equations = Equations::new(sensor, &all);
+    let left: Vec<_> = all.iter().map(|row| super::least_squares::difference(row, &geometry.predict(row))).collect();
+    let square = |row: usize| -> f64 {
+        let of = equations.of(row);
+        of.map(|equation| (left[row][equations.component(equation)] / equations.sigmas()[equation].max(1e-9)).powi(2)).sum()
+    };
+    let squares: Vec<f64> = (0..all.len()).map(square).collect();
+    let weights = robust::weights(&squares, &equations.counts());
+    let far = (0..all.len()).filter(|row| weights[*row] < robust::FAR);
+    Ok(far.map(|row| (row, left[row].fixed_rows::<3>(0).norm())).collect())
+}
+
+/// As [`identify_real`] of readings none of which is far off.
+fn identify_good(
+    robot: &Arm,
+    aligned: &Arm,
+    sensor: &Sensor,
+    measurements: &[Measurement],
+    mut notes: Vec<String>,
+) -> Result<Identification, IdentificationError> {
     let fit: Vec<&Measurement> = measurements.iter().filter(|row| row.role == Role::Fit).collect();
     let problem = Plain::new(aligned, sensor, Weights::Noise, &fit)?;
     let structure = Subspace::of_components(aligned, problem.equations().components());
@@ -46,7 +97,7 @@ pub fn identify_real(
     let readings = Readings { sensor, measurements: &fit, weights: &weights, displacement: &[], scatter: &[] };
     let geometry = geometry::fit(robot, readings)?;
 
-    let mut notes = geometry.notes.clone();
+    notes.extend(geometry.notes.iter().cloned());
     let (values, missed) = expressed(aligned, sensor, &structure, &geometry, &fit);
     if missed > EXPRESSED {
         notes.push(format!(

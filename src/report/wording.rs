@@ -159,7 +159,12 @@ fn remainder(of: &Remainder) -> String {
 
 fn remains(part: &Remains) -> String {
     match part {
-        Remains::Shape { detail, rms_m } => format!("{detail} ({:.0} µm)", rms_m * 1e6),
+        Remains::Shape { detail, besides: 0, rms_m } => format!("{detail} ({:.0} µm)", rms_m * 1e6),
+        Remains::Shape { detail, besides, rms_m } => format!(
+            "{detail} ({:.0} µm, together with {besides} more shape{})",
+            rms_m * 1e6,
+            if *besides == 1 { "" } else { "s" }
+        ),
         Remains::Smaller { count } => format!("{count} smaller one{}", if *count == 1 { "" } else { "s" }),
         Remains::Scatter { joint, sigma, slides } => {
             let (size, unit) = if *slides { (sigma * 1e6, "µm") } else { (sigma.to_degrees() * 3600.0, "arcsec") };
@@ -416,7 +421,7 @@ mod tests {
     #[test]
     fn what_remains_is_said_part_by_part() {
         let remains = vec![
-            Remains::Shape { detail: "angle of joint 3 near 20°".to_owned(), rms_m: 41.6e-6 },
+            Remains::Shape { detail: "angle of joint 3 near 20°".to_owned(), besides: 0, rms_m: 41.6e-6 },
             Remains::Smaller { count: 1 },
             Remains::Scatter { joint: 4, sigma: 1.0_f64.to_radians() / 360.0, slides: false },
             Remains::Scatter { joint: 1, sigma: 7e-6, slides: true },

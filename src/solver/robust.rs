@@ -32,66 +32,92 @@ pub(crate) fn level(squares: &[f64], counts: &[usize]) -> f64 {
 }
 
 /// Weights of readings with these squared residuals, of so many equations each, in the order of measuring (Huber's, on the squares): one
-/// for all but rare ones, and for those that have neighbours like them ([`alone`]).
+/// for all but rare ones, and for those of an [`event`].
 #[must_use]
 pub(crate) fn weights(squares: &[f64], counts: &[usize]) -> Vec<f64> {
+    let mut weights = by_size(squares, counts);
+    weights.iter_mut().zip(event(squares, counts)).filter(|(_, event)| *event).for_each(|(weight, _)| *weight = 1.0);
+    weights
+}
+
+fn by_size(squares: &[f64], counts: &[usize]) -> Vec<f64> {
     let level = level(squares, counts);
-    // Twice as far off counts a quarter, then less and less: an outlier tells nothing.
+    // Twice as far off counts a sixteenth, then less and less: an outlier tells nothing.
     let weight = |(square, count): (&f64, &usize)| {
         let limit = rare(*count) * level;
         if *square <= limit { 1.0 } else { (limit / square) * (limit / square) }
     };
-    let mut weights: Vec<f64> = squares.iter().zip(counts).map(weight).collect();
-    let far: Vec<bool> = weights.iter().map(|weight| *weight < FAR).collect();
-    for (weight, (far, alone)) in weights.iter_mut().zip(far.iter().zip(alone(&far))) {
-        if *far && !alone {
-            *weight = 1.0;
-        }
-    }
-    weights
+    squares.iter().zip(counts).map(weight).collect()
 }
 
-/// Which of the rows that are `far` off are so by themselves: not in a run of neighbours, in the order of measuring, that is longer than
-/// chance would have it.
+/// Which readings are far off in a run of neighbours, in the order of measuring, that is longer than chance would have it: a step, or
+/// another session, and no errors of single readings.
 #[must_use]
-pub(crate) fn alone(far: &[bool]) -> Vec<bool> {
+pub(crate) fn event(squares: &[f64], counts: &[usize]) -> Vec<bool> {
+    let far: Vec<bool> = by_size(squares, counts).into_iter().map(|weight| weight < FAR).collect();
     let total = far.len() as f64;
     let share = far.iter().filter(|far| **far).count() as f64 / total.max(1.0);
-    let mut alone = far.to_vec();
+    let mut event = vec![false; far.len()];
     let mut begin = 0;
     while begin < far.len() {
         let run = far[begin..].iter().take_while(|far| **far).count();
         if run > 1 && total * libm::pow(share, run as f64) < BY_CHANCE {
-            alone[begin..begin + run].fill(false);
+            event[begin..begin + run].fill(true);
         }
         begin += run + 1;
     }
-    alone
+    event
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::distribution::chi_squared_tail;
+
+    /// Both tables against the distribution itself.
+    #[test]
+    fn one_square_in_a_thousand_is_rare_and_half_of_them_are_below_the_median() {
+        for equations in 1..=6 {
+            let tail = |value: f64| chi_squared_tail(value, equations as f64);
+            assert!((tail(rare(equations)) - 1e-3).abs() < 1e-5, "{equations}: {}", tail(rare(equations)));
+            assert!((tail(median(equations)) - 0.5).abs() < 2e-4, "{equations}: {}", tail(median(equations)));
+        }
+    }
+
+    /// However large the noise is that all share, a reading twice as far off as is rare counts a sixteenth: its square is four times too
+    /// large.
+    #[test]
+    fn weights_do_not_hang_on_the_unit_of_the_noise() {
+        for unit in [1e-3, 1.0, 50.0] {
+            let mut squares = vec![median(3) * unit; 20];
+            squares.extend([4.0 * rare(3) * unit, rare(3) * unit]);
+            let found = weights(&squares, &[3; 22]);
+            assert!(found[..20].iter().all(|weight| *weight == 1.0));
+            assert!((found[20] - 1.0 / 16.0).abs() < 1e-12 && (found[21] - 1.0).abs() < 1e-9, "{found:?}");
+        }
+    }
 
     #[test]
     fn the_level_is_that_of_most_readings() {
         // Squares of three equations with sigma 3: the median is 9 times the table's.
-        let squares: Vec<f64> = (0..100).map(|at| if at % 9 == 0 { 1e6 } else { 9.0 * 2.366 }).collect();
+        let squares: Vec<f64> = (0..100).map(|at| if at % 9 == 0 { 1e6 } else { 9.0 * median(3) }).collect();
         assert!((level(&squares, &[3; 100]) - 9.0).abs() < 1e-12);
         let weights = weights(&squares, &[3; 100]);
         assert!(weights.iter().enumerate().all(|(at, weight)| if at % 9 == 0 { *weight < 1e-6 } else { *weight == 1.0 }));
     }
 
     #[test]
-    fn neighbours_that_are_far_off_together_are_no_errors_of_single_readings() {
-        let far = |rows: &dyn Fn(usize) -> bool| (0..200).map(rows).collect::<Vec<bool>>();
+    fn neighbours_that_are_far_off_together_are_one_event() {
+        let of = |far: &dyn Fn(usize) -> bool| {
+            let squares: Vec<f64> = (0..200).map(|row| if far(row) { 1e6 } else { median(3) }).collect();
+            event(&squares, &[3; 200])
+        };
         // One in ten here and there: two neighbours are chance.
-        let scattered = far(&|row| row % 10 == 0 || row == 51);
-        assert_eq!(alone(&scattered), scattered);
+        assert!(!of(&|row| row % 10 == 0 || row == 51).contains(&true));
         // The last forty of two hundred.
-        assert!(!alone(&far(&|row| row >= 160)).contains(&true));
+        assert_eq!(of(&|row| row >= 160), (0..200).map(|row| row >= 160).collect::<Vec<_>>());
         // A block beside some that are alone.
-        let both = alone(&far(&|row| row % 25 == 0 || (60..68).contains(&row)));
-        assert_eq!((both[25], both[61]), (true, false));
+        let both = of(&|row| row % 25 == 0 || (60..68).contains(&row));
+        assert_eq!((both[25], both[61]), (false, true));
     }
 }
