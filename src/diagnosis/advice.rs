@@ -1,13 +1,11 @@
 //! What to measure next.
 
+use std::collections::BTreeSet;
+
 use super::Analysis;
 use super::detectability::Detectability;
 use super::outcome::{Candidate, Verdict};
-use crate::effects::{Kind, Need};
-
-/// What tells linear from saturating effects of load.
-const PAYLOADS: &str =
-    "linear and saturating effects of load look alike under one payload: the same configurations with two or three payloads";
+use crate::effects::{Advice, Kind, Measure, Need};
 
 /// What would tell apart what these readings do not, and show what they could not.
 pub(super) fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], power: &Detectability, verdict: Verdict) -> Vec<String> {
@@ -19,21 +17,14 @@ pub(super) fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], power: &Det
     };
     let columns = &analysis.conditions.columns;
     for set in sets {
-        let has = |kind: Kind| set.iter().any(|one| one.kind == Some(kind));
-        if has(Kind::JointCompliance) && has(Kind::LinkBending) {
-            say("compliance or bending: load the arm sideways, tilt the base, or put a target on a link in between");
-        }
-        if (has(Kind::LinkBending) && has(Kind::TiltClearance)) || has(Kind::JointCompliance) || has(Kind::GravityLostMotion) {
-            say(PAYLOADS);
-        }
-        if has(Kind::LinkThermalGrowth) || has(Kind::JointThermalDrift) || has(Kind::BaseDrift) {
-            say("temperature or time: heat and cool in one session, so that temperatures return while time goes on");
-        }
-        if has(Kind::JointEccentricity) || has(Kind::GearCoupling) {
-            say("harmonics of a joint: move it through its whole travel, other joints at rest");
-        }
-        if has(Kind::BaseStep) || has(Kind::ToolStep) {
-            say("base or tool: read the same few configurations again with another orientation of the tool");
+        let kinds: BTreeSet<Kind> = set.iter().filter_map(|one| one.kind).collect();
+        let advice = kinds.iter().filter_map(|kind| kind.descriptor().known).flat_map(|known| known.advice);
+        let measures = advice.filter_map(|advice| match *advice {
+            Advice::Alone(measure) => Some(measure),
+            Advice::Beside(other, measure) => kinds.contains(&other).then_some(measure),
+        });
+        for measure in measures.collect::<BTreeSet<Measure>>() {
+            say(measure.words());
         }
         if set.iter().any(|one| one.kind.is_none()) {
             say("a shape without a name: more configurations where it shows");
@@ -74,7 +65,7 @@ pub(super) fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], power: &Det
     }
     let payload = analysis.measurements.first().and_then(|row| row.payload_kg);
     if analysis.measurements.iter().all(|row| row.payload_kg == payload) {
-        say(PAYLOADS);
+        say(Measure::Payloads.words());
     }
     if verdict != Verdict::Explained {
         if analysis.repeats.is_none() {

@@ -5,6 +5,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::linear::Linear;
 use super::settings;
+use crate::effects::kind::joint_eccentricity::Harmonic;
 use crate::effects::signature::library::RIPPLES;
 use crate::effects::signature::shape::Shape;
 use crate::numerics::gram;
@@ -35,7 +36,8 @@ pub(super) fn scan(linear: &Linear<'_>, residual: &DVector<f64>, level: f64, set
     let lower = normal.l();
     let joints = readings.first().map_or(0, |reading| reading.joints.len());
     let known = |joint: usize, waves: u16| {
-        candidates.hypotheses.iter().any(|hypothesis| hypothesis.shape == Shape::Harmonic { joint, order: f64::from(waves) })
+        let wave = Shape::Harmonic(Harmonic { joint, order: f64::from(waves) });
+        candidates.hypotheses.iter().any(|hypothesis| hypothesis.shape == wave)
     };
     let mut found: Vec<Ripple> = (0..joints)
         .into_par_iter()
