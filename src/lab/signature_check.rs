@@ -44,8 +44,9 @@ fn every_signature_is_what_physics_makes() {
     let known = conditions(&rows, &fitted, &[], Loads::AsItStands, None, &Model::default()).0;
     let library = library(&Mechanism::new(&scene.arm), &known.columns);
     for one in &library {
-        let widths = [one.spread.len(), one.shape.columns(&known.readings[0], false).len()];
-        assert_eq!(widths, [one.shape.width(false); 2], "{one:?}");
+        let orientation = known.columns.orientation;
+        let widths = [one.spread.len(), one.shape.columns(&known.readings[0], orientation).len()];
+        assert_eq!(widths, [one.shape.width(orientation); 2], "{one:?}");
         assert!(one.kind.is_some() || one.shape.unnamed().is_some(), "{one:?} has neither a name nor a family");
         assert!(one.shape.magnitude_width() <= widths[0]);
     }

@@ -1,5 +1,5 @@
 //! What an effect of unit magnitude does to the target: true pose = pose at the joint readings + effect, to first order. What a shape
-//! answers of itself ([`Follows`], [`Named`]) is in its own file; here is what the files share.
+//! answers of itself (`Follows`, `Named`) is in its own file; here is what the files share.
 
 use nalgebra::Vector3;
 use schemars::JsonSchema;
