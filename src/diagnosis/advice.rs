@@ -1,10 +1,12 @@
 //! What to measure next.
 
+use std::collections::BTreeSet;
+
 use super::Analysis;
 use super::conclusion::Advice;
 use super::detectability::Detectability;
 use super::outcome::{Candidate, Verdict};
-use crate::effects::{Kind, Need};
+use crate::effects::{self, Kind, Measure, Need};
 
 /// What would tell apart what these readings do not, and show what they could not.
 pub(super) fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], power: &Detectability, verdict: Verdict) -> Vec<Advice> {
@@ -16,21 +18,14 @@ pub(super) fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], power: &Det
     };
     let columns = &analysis.conditions.columns;
     for set in sets {
-        let has = |kind: Kind| set.iter().any(|one| one.kind == Some(kind));
-        if has(Kind::JointCompliance) && has(Kind::LinkBending) {
-            add(Advice::LoadSideways);
-        }
-        if (has(Kind::LinkBending) && has(Kind::TiltClearance)) || has(Kind::JointCompliance) || has(Kind::GravityLostMotion) {
-            add(Advice::SeveralPayloads);
-        }
-        if has(Kind::LinkThermalGrowth) || has(Kind::JointThermalDrift) || has(Kind::BaseDrift) {
-            add(Advice::HeatAndCool);
-        }
-        if has(Kind::JointEccentricity) || has(Kind::GearCoupling) {
-            add(Advice::WholeTravel);
-        }
-        if has(Kind::BaseStep) || has(Kind::ToolStep) {
-            add(Advice::OtherOrientation);
+        let kinds: BTreeSet<Kind> = set.iter().filter_map(|one| one.kind).collect();
+        let advice = kinds.iter().filter_map(|kind| kind.descriptor().known).flat_map(|known| known.advice);
+        let measures = advice.filter_map(|advice| match *advice {
+            effects::Advice::Alone(measure) => Some(measure),
+            effects::Advice::Beside(other, measure) => kinds.contains(&other).then_some(measure),
+        });
+        for measure in measures.collect::<BTreeSet<Measure>>() {
+            add(Advice::Measure(measure));
         }
         if set.iter().any(|one| one.kind.is_none()) {
             add(Advice::MoreWhereItShows);
@@ -58,7 +53,7 @@ pub(super) fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], power: &Det
     }
     let payload = analysis.measurements.first().and_then(|row| row.payload_kg);
     if analysis.measurements.iter().all(|row| row.payload_kg == payload) {
-        add(Advice::SeveralPayloads);
+        add(Advice::Measure(Measure::Payloads));
     }
     if verdict != Verdict::Explained {
         if analysis.repeats.is_none() {

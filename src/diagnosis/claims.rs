@@ -3,7 +3,6 @@
 use super::Analysis;
 use super::outcome::Place;
 use super::search::Claim;
-use crate::effects::signature::shape::Shape;
 
 /// What hypothesis number `hypothesis` claims.
 pub(super) fn claim(analysis: &Analysis<'_>, hypothesis: usize) -> Claim {
@@ -14,10 +13,7 @@ pub(super) fn claim(analysis: &Analysis<'_>, hypothesis: usize) -> Claim {
 /// Where it is and, of a step, when.
 pub(super) fn place(analysis: &Analysis<'_>, hypothesis: usize) -> Place {
     let of = &analysis.evidence.candidates.hypotheses[hypothesis];
-    let time_s = match of.shape {
-        Shape::BaseStep { row } | Shape::ToolStep { row } => analysis.conditions.times.get(row).copied(),
-        _ => None,
-    };
+    let time_s = of.shape.row().and_then(|row| analysis.conditions.times.get(row).copied());
     Place { level: of.location.level, index: of.location.index, time_s }
 }
 

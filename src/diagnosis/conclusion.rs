@@ -3,7 +3,7 @@
 use super::held_out::Block;
 use super::outcome::{Candidate, Effect, Gap, Map, MinimumDetectable, NoiseFloor, NoiseSource, Place, Residual, Verdict};
 use super::settings::Settings;
-use crate::effects::{Kind, Location};
+use crate::effects::{Kind, Location, Measure};
 
 /// All that was found; in words it is [`super::outcome::Diagnosis`].
 #[derive(Clone, Debug, PartialEq)]
@@ -264,16 +264,8 @@ impl Step {
 /// Something to measure next. Joints count from 1.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Advice {
-    /// Loads from the side tell a joint that yields from a link that bends.
-    LoadSideways,
-    /// Several payloads tell what is linear in the load from what saturates.
-    SeveralPayloads,
-    /// Temperatures that return tell temperature from time.
-    HeatAndCool,
-    /// The whole travel of a joint shows its harmonics.
-    WholeTravel,
-    /// Another orientation of the tool tells base from tool.
-    OtherOrientation,
+    /// What tells two kinds apart, as the table of kinds has it.
+    Measure(Measure),
     /// More readings where a shape without a name shows.
     MoreWhereItShows,
     /// Many readings of few configurations show how well a joint repeats.

@@ -9,7 +9,6 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use super::products::Marginal;
 use super::settings::{SCALES, Settings};
 use crate::effects::signature::library::Hypothesis;
-use crate::effects::signature::shape::Shape;
 
 /// What is known of the noise beforehand: so many readings' worth (degrees of freedom) of a mean square, in declared sigmas.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,16 +78,9 @@ impl Candidates {
             // Two bumps that overlap are one; so are two generalisations of one kind.
             (None, None) => {
                 let alike = special_case(a).is_some() && special_case(a) == special_case(b);
-                a.location == b.location && (alike || overlap(a, b))
+                a.location == b.location && (alike || a.shape.overlaps(&b.shape))
             }
         }
-    }
-}
-
-fn overlap(a: &Hypothesis, b: &Hypothesis) -> bool {
-    match (a.shape, b.shape) {
-        (Shape::Bump { centre: x, half_width: w, .. }, Shape::Bump { centre: y, half_width: v, .. }) => (x - y).abs() < w.max(v),
-        _ => false,
     }
 }
 

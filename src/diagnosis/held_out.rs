@@ -282,7 +282,10 @@ impl Validation<'_> {
             let again = ripple::scan(&of_rows, &residual, level, &counts, &self.settings.ripple);
             let is_again = |number: &usize| {
                 let shape = candidates.hypotheses[*number].shape;
-                let same = |one: &Ripple| shape == Shape::Harmonic { joint: one.joint, order: f64::from(one.waves) };
+                let same = |one: &Ripple| {
+                    let (joint, order) = (one.joint, f64::from(one.waves));
+                    shape == Shape::Harmonic(Harmonic { joint, order })
+                };
                 were_active[number - found.start] && again.iter().any(same)
             };
             let more: Vec<usize> = found.clone().filter(is_again).collect();

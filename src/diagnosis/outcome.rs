@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::held_out::Block;
 use super::settings::Settings;
+pub use crate::effects::Parameters;
 use crate::effects::signature::shape::{Displacement, Reading, Shape};
 use crate::effects::{Kind, Level};
 
@@ -170,36 +171,6 @@ pub struct Magnitude {
     pub unit: String,
     /// 95 % interval.
     pub ci95: [f64; 2],
-}
-
-/// What a simulation of an effect needs besides kind, place and magnitude; absent where the kind has no such thing. As fitted to all
-/// readings: true = reading + effect. Root is the arm's first frame, where its base stands nominally.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Parameters {
-    /// Of a backlash: −1 where the output lags behind the last move, as play makes it; 1 where it leads.
-    pub sign: Option<f64>,
-    /// Of a harmonic: the error is magnitude · cos(order · q + phase), rad.
-    pub phase_rad: Option<f64>,
-    /// Of a harmonic: periods per turn of the joint.
-    pub order: Option<f64>,
-    /// Of a coupling: the joint whose angle counts, from 1; the joint itself where its ratio is off.
-    #[schemars(range(min = 1))]
-    pub source: Option<usize>,
-    /// Of base (in root; of a drift, over the whole session) or tool (in the tool frame), m. The magnitude is its length, less what
-    /// noise adds to a length.
-    pub translation_m: Option<[f64; 3]>,
-    /// With it: rotation vector about the origin of the same frame, rad; zero where only positions of a tool are measured.
-    pub rotation_rad: Option<[f64; 3]>,
-    /// Of a step: share of the session (0 to 1) after which it happens, midway between two readings.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub after: Option<f64>,
-    /// Of a step: place in the order of time, from 0, of the first reading after it.
-    pub row: Option<usize>,
-    /// Of outliers: their noise over that of the others.
-    pub factor: Option<f64>,
-    /// Of a clearance: the share of the load (of the moment: over weight times length of the arm outboard) up to which friction holds
-    /// the play in its middle.
-    pub held: Option<f64>,
 }
 
 /// What a named effect was diagnosed to follow: true = reading + sum of coefficient times column.

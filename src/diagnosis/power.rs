@@ -505,6 +505,7 @@ mod tests {
 
     use super::*;
     use crate::diagnosis::products::test_marginal;
+    use crate::effects::kind::joint_compliance::Torque;
     use crate::effects::signature::library::Hypothesis;
     use crate::effects::signature::shape::Shape;
     use crate::effects::{Kind, Location};
@@ -516,7 +517,7 @@ mod tests {
             share: None,
             kind,
             location: Location { level: crate::effects::Level::Joint, index: Some(joint) },
-            shape: Shape::Torque { joint },
+            shape: Shape::Torque(Torque { joint }),
             range: [0.5, 2.0],
             spread: vec![if width == 2 { 0.7 } else { 1.0 }; width],
             detail: String::new(),

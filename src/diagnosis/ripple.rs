@@ -5,6 +5,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::linear::Linear;
 use super::settings;
+use crate::effects::kind::joint_eccentricity::Harmonic;
 use crate::effects::signature::library::RIPPLES;
 use crate::effects::signature::shape::Shape;
 use crate::numerics::gram;
@@ -47,7 +48,7 @@ pub(super) fn scan(
     let lower = normal.l();
     let joints = readings.first().map_or(0, |reading| reading.joints.len());
     let known = |joint: usize, waves: u16| {
-        let wave = Shape::Harmonic { joint, order: f64::from(waves) };
+        let wave = Shape::Harmonic(Harmonic { joint, order: f64::from(waves) });
         candidates.hypotheses.iter().zip(&candidates.active).any(|(of, active)| *active && of.shape == wave)
     };
     let mut found: Vec<Ripple> = (0..joints)

@@ -13,8 +13,10 @@ use super::rows::Rows;
 use super::search::Found;
 use super::settings;
 use crate::effects::Kind;
+use crate::effects::kind::joint_eccentricity::Harmonic;
 use crate::effects::signature::library::{Hypothesis, RIPPLES};
 use crate::effects::signature::shape::Shape;
+use crate::effects::signature::unnamed::Nameless;
 use crate::measurement::equations::Equations;
 use crate::solver::whitening::Whitening;
 
@@ -40,8 +42,8 @@ pub(super) fn alike(one: &[Scatter], other: &[Scatter], settings: &settings::Sca
 /// Whether scatter may be mistaken for it: one of thousands of ripples and bumps.
 pub(super) fn is_contested(of: &Hypothesis) -> bool {
     of.kind == Some(Kind::StrainWaveError)
-        || matches!(of.shape, Shape::Harmonic { order, .. } if order >= f64::from(*RIPPLES.start()))
-        || matches!(of.shape, Shape::Bump { .. })
+        || matches!(of.shape, Shape::Harmonic(Harmonic { order, .. }) if order >= f64::from(*RIPPLES.start()))
+        || matches!(of.shape, Shape::Nameless(Nameless::Bump(_)))
 }
 
 /// The joints that scatter, given what was found, most likely first. `known`: some scatter was in the noise already when that was found, so

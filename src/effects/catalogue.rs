@@ -71,7 +71,7 @@ pub fn catalogue_markdown() -> String {
     let code = |text: &str| format!("`{text}`");
     let kinds = Kind::ALL.map(|kind| {
         let of = kind.descriptor();
-        let named = if of.known { "yes" } else { "no" };
+        let named = if of.known.is_some() { "yes" } else { "no" };
         let magnitude = format!("{}, {}", of.magnitude, of.unit.name());
         vec![
             code(of.name),

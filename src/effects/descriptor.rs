@@ -2,10 +2,12 @@
 
 use super::kind::Kind;
 use super::location::Level;
+use super::signature::library::{Hypothesis, Site};
+use crate::arm::Arm;
 
 /// Everything that is the same for all effects of a kind, wherever they are. Conventions: true pose = pose at the joint readings +
 /// effect; magnitudes are positive where the kind has no sign.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Descriptor {
     /// Name in scenes, options, tables and results.
     pub name: &'static str,
@@ -21,6 +23,8 @@ pub struct Descriptor {
     pub range: Range,
     /// Where the range comes from.
     pub source: Source,
+    /// How many times the upper end of the range it reaches on hobby and cable-driven arms.
+    pub softest: f64,
     /// Whether physics allows one sign only, in which case the diagnosis allows no other. Kinds of several coefficients have no sign.
     pub one_signed: bool,
     /// Whether results tell its sign beside its magnitude, which is positive then (as a width is).
@@ -29,14 +33,36 @@ pub struct Descriptor {
     pub load: Load,
     /// What the data must have for it to be seen, or to have its unit.
     pub needs: &'static [Need],
-    /// Whether the diagnosis has a name for it. Others are injected to see whether it says that something else is there.
-    pub known: bool,
+    /// What the diagnosis knows of it, if it has a name for it. Others are injected to see whether it says that something else is there.
+    pub known: Option<Known>,
     /// Whether two of it may sit at one place: ripples of two gear stages, motion that leaks from two joints.
     pub may_repeat: bool,
     /// What it is mistaken for, and what measurement tells them apart.
     pub neighbours: &'static [Neighbour],
     /// How a scene writes it.
     pub scene: SceneKeys,
+}
+
+/// What the diagnosis knows of a kind.
+#[derive(Clone, Copy, Debug)]
+pub struct Known {
+    /// Adds what may be there of it at a place: nothing where it cannot sit there, or where the data lack what it takes to see it.
+    pub hypotheses: fn(&Site<'_>, &mut Vec<Hypothesis>),
+    /// How much of a displacement its signature may miss.
+    pub misses: Misses,
+    /// Whether on this arm another kind does the same, if there are such arms: a case of one would be a case of the other.
+    pub doubles: Option<fn(&Arm) -> bool>,
+    /// What to measure next where it is in a set that explains the readings.
+    pub advice: &'static [Advice],
+}
+
+/// What of the displacement that physics makes is not in a signature, at most, as shares. Tests compare them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Misses {
+    /// Where magnitude and base are fitted.
+    pub fitted: f64,
+    /// Where the magnitude is that of the physics.
+    pub as_said: f64,
 }
 
 /// A unit of magnitudes, SI.
@@ -177,6 +203,52 @@ pub struct Neighbour {
     pub kind: Kind,
     /// What measurement tells them apart.
     pub told_apart_by: &'static str,
+}
+
+/// What to measure next where a set that explains the readings has a kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Advice {
+    /// Whatever else there is.
+    Alone(Measure),
+    /// Where this kind is in the set, too.
+    Beside(Kind, Measure),
+}
+
+/// A measurement that tells effects apart; advice is given in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Measure {
+    /// A load from the side.
+    Sideways,
+    /// Several payloads.
+    Payloads,
+    /// Temperatures that return while time goes on.
+    HeatAndCool,
+    /// All angles of a joint.
+    WholeTravel,
+    /// The tool turned.
+    OtherOrientations,
+}
+
+impl Measure {
+    /// In words.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Measure::Sideways => {
+                "compliance or bending: load the arm sideways, tilt the base, or put a target on a link in between"
+            }
+            Measure::Payloads => {
+                "linear and saturating effects of load look alike under one payload: the same configurations with two or three payloads"
+            }
+            Measure::HeatAndCool => {
+                "temperature or time: heat and cool in one session, so that temperatures return while time goes on"
+            }
+            Measure::WholeTravel => "harmonics of a joint: move it through its whole travel, other joints at rest",
+            Measure::OtherOrientations => {
+                "base or tool: read the same few configurations again with another orientation of the tool"
+            }
+        }
+    }
 }
 
 /// Keys of a table `[[injected.effect]]` besides `kind`.

@@ -1,12 +1,36 @@
-//! The kinds of un-modelled effects, and the one table that says everything about each.
+//! The kinds of un-modelled effects, the one table that says everything about each, and the shapes that they follow. The signature of a
+//! kind (its shapes and its hypotheses) is in the file of its name.
+
+pub mod backlash;
+pub mod base_drift;
+pub mod base_step;
+pub mod base_tilt;
+pub mod gear_coupling;
+pub mod gravity_lost_motion;
+pub mod joint_compliance;
+pub mod joint_eccentricity;
+pub mod joint_thermal_drift;
+pub mod link_bending;
+pub mod link_thermal_growth;
+pub mod measurement_scale;
+pub mod radial_clearance;
+pub mod strain_wave_error;
+pub mod tilt_clearance;
+pub mod tool_step;
 
 use std::fmt;
 
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
-use super::descriptor::{Descriptor, Load, Need, Neighbour, Range, SceneKeys, ScenePlace, Source, Unit};
+use super::descriptor::{
+    Advice, Descriptor, Known, Load, Measure, Misses, Need, Neighbour, Range, SceneKeys, ScenePlace, Source, Unit,
+};
 use super::location::Level;
+use super::signature::library::{Hypothesis, Site};
+use super::signature::shape::Named;
+use super::signature::unnamed::Nameless;
 use crate::units::ARCSEC;
 
 /// A kind of un-modelled effect; those that the diagnosis has a name for come first.
@@ -61,6 +85,84 @@ pub enum Kind {
     HardeningStiffness,
 }
 
+/// What an effect follows. Joints and links count from 0 here, and from 1 where it is written; link `i` moves with joint `i`. One column
+/// per number in brackets.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "shape", rename_all = "snake_case", expecting = "a shape, with joints and links that count from 1")]
+#[schemars(transform = one_list)]
+#[expect(missing_docs, reason = "each is described in its file")]
+pub enum Shape {
+    Torque(joint_compliance::Torque),
+    MomentAcross(link_bending::MomentAcross),
+    Beam(link_bending::Beam),
+    Direction(backlash::Direction),
+    TorqueSign(gravity_lost_motion::TorqueSign),
+    LeaningTorqueSign(gravity_lost_motion::LeaningTorqueSign),
+    Harmonic(joint_eccentricity::Harmonic),
+    TwoHarmonics(joint_eccentricity::TwoHarmonics),
+    Ratio(gear_coupling::Ratio),
+    Growth(link_thermal_growth::Growth),
+    GrowthOnFoot(link_thermal_growth::GrowthOnFoot),
+    Warmth(joint_thermal_drift::Warmth),
+    ForceAcrossSign(radial_clearance::ForceAcrossSign),
+    MomentAcrossSign(tilt_clearance::MomentAcrossSign),
+    BaseDrift(base_drift::BaseDrift),
+    BaseStep(base_step::BaseStep),
+    BaseTilt(base_tilt::BaseTilt),
+    ToolStep(tool_step::ToolStep),
+    Scale(measurement_scale::Scale),
+    /// One that no kind has.
+    #[serde(untagged)]
+    Nameless(Nameless),
+}
+
+/// Who answers for a shape.
+pub(super) enum Answers<'a> {
+    /// It has a name, or may have.
+    Named(&'a dyn Named),
+    /// It never has.
+    Nameless(&'a Nameless),
+}
+
+impl Shape {
+    /// Whoever answers for it.
+    pub(super) fn answers(&self) -> Answers<'_> {
+        Answers::Named(match self {
+            Shape::Torque(of) => of,
+            Shape::MomentAcross(of) => of,
+            Shape::Beam(of) => of,
+            Shape::Direction(of) => of,
+            Shape::TorqueSign(of) => of,
+            Shape::LeaningTorqueSign(of) => of,
+            Shape::Harmonic(of) => of,
+            Shape::TwoHarmonics(of) => of,
+            Shape::Ratio(of) => of,
+            Shape::Growth(of) => of,
+            Shape::GrowthOnFoot(of) => of,
+            Shape::Warmth(of) => of,
+            Shape::ForceAcrossSign(of) => of,
+            Shape::MomentAcrossSign(of) => of,
+            Shape::BaseDrift(of) => of,
+            Shape::BaseStep(of) => of,
+            Shape::BaseTilt(of) => of,
+            Shape::ToolStep(of) => of,
+            Shape::Scale(of) => of,
+            Shape::Nameless(of) => return Answers::Nameless(of),
+        })
+    }
+}
+
+/// In the schema all shapes are alternatives in one list, as they are written; those of no kind, which are last, are a list of their own
+/// until here.
+fn one_list(schema: &mut Schema) {
+    let Some(mut shapes) = ["oneOf", "anyOf"].into_iter().find_map(|key| schema.remove(key)) else { return };
+    let nameless = shapes.as_array_mut().and_then(Vec::pop).and_then(|mut nameless| nameless.get_mut("oneOf").map(Value::take));
+    if let (Some(shapes), Some(Value::Array(nameless))) = (shapes.as_array_mut(), nameless) {
+        shapes.extend(nameless);
+    }
+    schema.insert("oneOf".to_owned(), shapes);
+}
+
 /// Angle per torque of joints, rad/(N·m).
 const SOFTNESS: Range = Range::ByHalf { proximal: [1.0 / 6e4, 1.0 / 1e4], distal: [1.0 / 1.5e4, 1.0 / 2e3] };
 /// Play of gears, full width, rad.
@@ -87,6 +189,26 @@ const ON_THE_FOOT: &str = "a target on the base, or on the first link near it";
 const WHOLE_TRAVEL: &str = "the whole travel of the joint";
 const SPREAD_OVER_TIME: &str = "readings spread evenly over the session";
 const ENCODERS_FEEL_NO_LOAD: &str = "several payloads: an encoder does not feel them";
+
+/// On hobby and cable-driven arms joints yield by a degree under their load, encoders and gears are ten times worse (assumed),
+const TENFOLD: f64 = 10.0;
+/// and gears have one to two degrees of play (assumed).
+const PLAY_OF_DEGREES: f64 = 60.0;
+/// What nothing is known to be larger of.
+const AS_ELSEWHERE: f64 = 1.0;
+
+/// A signature of first order.
+const FIRST_ORDER: Misses = Misses { fitted: 0.005, as_said: 2e-3 };
+/// A deflected arm bends its own torques.
+const DEFLECTED: Misses = Misses { fitted: 0.01, as_said: 0.02 };
+/// Where the load that seats is as small as it is unknown, or near to what friction holds, the formula knows the side less well.
+const SEATED: Misses = Misses { fitted: 0.15, as_said: 0.15 };
+/// The same of a bearing.
+const SEATED_BEARING: Misses = Misses { fitted: 0.15, as_said: 0.2 };
+/// The sensors of temperature are off by some hundredths of a degree.
+const WARMED: Misses = Misses { fitted: 0.05, as_said: 2e-3 };
+/// Besides, a link grows to the target in the formula, to the tool's origin in the physics.
+const GROWN: Misses = Misses { fitted: 0.05, as_said: 0.02 };
 
 impl Kind {
     /// Every kind, those that the diagnosis knows first.
@@ -128,11 +250,17 @@ impl Kind {
                 magnitude: "angle per torque",
                 range: SOFTNESS,
                 source: Source::Assumed,
+                softest: TENFOLD,
                 one_signed: true,
                 sign_apart: false,
                 load: Load::Drives,
                 needs: &[Need::Masses],
-                known: true,
+                known: Some(Known {
+                    hypotheses: joint_compliance::hypotheses,
+                    misses: DEFLECTED,
+                    doubles: None,
+                    advice: &[Advice::Beside(Kind::LinkBending, Measure::Sideways), Advice::Alone(Measure::Payloads)],
+                }),
                 may_repeat: false,
                 neighbours: &[
                     Neighbour { kind: Kind::LinkBending, told_apart_by: SIDEWAYS },
@@ -149,11 +277,17 @@ impl Kind {
                 magnitude: "angle per moment, summed along the link",
                 range: Range::Everywhere([0.5e-5, 5e-5]),
                 source: Source::Assumed,
+                softest: TENFOLD,
                 one_signed: true,
                 sign_apart: false,
                 load: Load::Drives,
                 needs: &[Need::Masses],
-                known: true,
+                known: Some(Known {
+                    hypotheses: link_bending::hypotheses,
+                    misses: DEFLECTED,
+                    doubles: None,
+                    advice: &[Advice::Beside(Kind::TiltClearance, Measure::Payloads)],
+                }),
                 may_repeat: false,
                 neighbours: &[
                     Neighbour { kind: Kind::JointCompliance, told_apart_by: SIDEWAYS },
@@ -169,11 +303,12 @@ impl Kind {
                 magnitude: "full width",
                 range: PLAY,
                 source: Source::Assumed,
+                softest: PLAY_OF_DEGREES,
                 one_signed: false,
                 sign_apart: true,
                 load: Load::None,
                 needs: &[Need::ApproachSides],
-                known: true,
+                known: Some(Known { hypotheses: backlash::hypotheses, misses: FIRST_ORDER, doubles: None, advice: &[] }),
                 may_repeat: false,
                 neighbours: &[Neighbour { kind: Kind::GravityLostMotion, told_apart_by: BOTH_SIDES }],
                 scene: SceneKeys { place: ScenePlace::TurningJoint, required: &["width_arcsec"], optional: &[] },
@@ -186,11 +321,17 @@ impl Kind {
                 magnitude: "full width",
                 range: PLAY,
                 source: Source::Assumed,
+                softest: PLAY_OF_DEGREES,
                 one_signed: true,
                 sign_apart: false,
                 load: Load::Seats,
                 needs: &[Need::Masses],
-                known: true,
+                known: Some(Known {
+                    hypotheses: gravity_lost_motion::hypotheses,
+                    misses: SEATED,
+                    doubles: None,
+                    advice: &[Advice::Alone(Measure::Payloads)],
+                }),
                 may_repeat: false,
                 neighbours: &[
                     Neighbour { kind: Kind::JointCompliance, told_apart_by: PAYLOADS },
@@ -206,11 +347,17 @@ impl Kind {
                 magnitude: "amplitude of the angle error",
                 range: Range::Everywhere([10.0 * ARCSEC, 100.0 * ARCSEC]),
                 source: Source::Assumed,
+                softest: TENFOLD,
                 one_signed: false,
                 sign_apart: false,
                 load: Load::None,
                 needs: &[],
-                known: true,
+                known: Some(Known {
+                    hypotheses: joint_eccentricity::hypotheses,
+                    misses: FIRST_ORDER,
+                    doubles: None,
+                    advice: &[Advice::Alone(Measure::WholeTravel)],
+                }),
                 may_repeat: false,
                 neighbours: &[
                     Neighbour { kind: Kind::JointCompliance, told_apart_by: ENCODERS_FEEL_NO_LOAD },
@@ -230,11 +377,12 @@ impl Kind {
                 magnitude: "amplitude of the angle error",
                 range: Range::Everywhere([8.0 * ARCSEC, 40.0 * ARCSEC]),
                 source: Source::Cited(STRAIN_WAVE_CATALOGUE),
+                softest: TENFOLD,
                 one_signed: false,
                 sign_apart: false,
                 load: Load::None,
                 needs: &[],
-                known: true,
+                known: Some(Known { hypotheses: strain_wave_error::hypotheses, misses: FIRST_ORDER, doubles: None, advice: &[] }),
                 may_repeat: true,
                 neighbours: &[Neighbour {
                     kind: Kind::MeasurementOutliers,
@@ -254,11 +402,17 @@ impl Kind {
                 magnitude: "angle per angle of the source",
                 range: Range::Everywhere([5e-5, 40e-5]),
                 source: Source::Assumed,
+                softest: TENFOLD,
                 one_signed: false,
                 sign_apart: false,
                 load: Load::None,
                 needs: &[],
-                known: true,
+                known: Some(Known {
+                    hypotheses: gear_coupling::hypotheses,
+                    misses: FIRST_ORDER,
+                    doubles: None,
+                    advice: &[Advice::Alone(Measure::WholeTravel)],
+                }),
                 may_repeat: true,
                 neighbours: &[Neighbour { kind: Kind::JointEccentricity, told_apart_by: WHOLE_TRAVEL }],
                 scene: SceneKeys {
@@ -275,11 +429,17 @@ impl Kind {
                 magnitude: "growth per length and kelvin",
                 range: Range::Everywhere([12e-6, 24e-6]),
                 source: Source::Cited(EXPANSION_TABLE),
+                softest: AS_ELSEWHERE,
                 one_signed: true,
                 sign_apart: false,
                 load: Load::None,
                 needs: &[Need::Temperatures],
-                known: true,
+                known: Some(Known {
+                    hypotheses: link_thermal_growth::hypotheses,
+                    misses: GROWN,
+                    doubles: None,
+                    advice: &[Advice::Alone(Measure::HeatAndCool)],
+                }),
                 may_repeat: false,
                 neighbours: &[
                     Neighbour { kind: Kind::JointThermalDrift, told_apart_by: OTHER_PACES },
@@ -295,11 +455,17 @@ impl Kind {
                 magnitude: "angle per kelvin",
                 range: Range::Everywhere([3e-6, 30e-6]),
                 source: Source::Assumed,
+                softest: AS_ELSEWHERE,
                 one_signed: false,
                 sign_apart: false,
                 load: Load::None,
                 needs: &[Need::Temperatures],
-                known: true,
+                known: Some(Known {
+                    hypotheses: joint_thermal_drift::hypotheses,
+                    misses: WARMED,
+                    doubles: None,
+                    advice: &[Advice::Alone(Measure::HeatAndCool)],
+                }),
                 may_repeat: false,
                 neighbours: &[
                     Neighbour { kind: Kind::LinkThermalGrowth, told_apart_by: OTHER_PACES },
@@ -315,11 +481,17 @@ impl Kind {
                 magnitude: "radius",
                 range: Range::Everywhere([10e-6, 60e-6]),
                 source: Source::Cited(BEARING_STANDARD),
+                softest: TENFOLD,
                 one_signed: true,
                 sign_apart: false,
                 load: Load::Seats,
                 needs: &[Need::Masses],
-                known: true,
+                known: Some(Known {
+                    hypotheses: radial_clearance::hypotheses,
+                    misses: SEATED_BEARING,
+                    doubles: None,
+                    advice: &[],
+                }),
                 may_repeat: false,
                 neighbours: &[Neighbour { kind: Kind::TiltClearance, told_apart_by: OTHER_DISTANCES }],
                 scene: SceneKeys { place: ScenePlace::Joint, required: &["radial_um"], optional: &[] },
@@ -332,11 +504,12 @@ impl Kind {
                 magnitude: "radius",
                 range: Range::Everywhere([20e-6, 200e-6]),
                 source: Source::Assumed,
+                softest: TENFOLD,
                 one_signed: true,
                 sign_apart: false,
                 load: Load::Seats,
                 needs: &[Need::Masses],
-                known: true,
+                known: Some(Known { hypotheses: tilt_clearance::hypotheses, misses: SEATED_BEARING, doubles: None, advice: &[] }),
                 may_repeat: false,
                 neighbours: &[
                     Neighbour { kind: Kind::LinkBending, told_apart_by: PAYLOADS },
@@ -352,11 +525,17 @@ impl Kind {
                 magnitude: "length of the translation over the whole session",
                 range: MOVES,
                 source: Source::Assumed,
+                softest: AS_ELSEWHERE,
                 one_signed: false,
                 sign_apart: false,
                 load: Load::None,
                 needs: &[Need::Times],
-                known: true,
+                known: Some(Known {
+                    hypotheses: base_drift::hypotheses,
+                    misses: FIRST_ORDER,
+                    doubles: None,
+                    advice: &[Advice::Alone(Measure::HeatAndCool)],
+                }),
                 may_repeat: false,
                 neighbours: &[
                     Neighbour { kind: Kind::LinkThermalGrowth, told_apart_by: HEAT_AND_COOL },
@@ -376,11 +555,17 @@ impl Kind {
                 magnitude: "length of the translation",
                 range: MOVES,
                 source: Source::Assumed,
+                softest: AS_ELSEWHERE,
                 one_signed: false,
                 sign_apart: false,
                 load: Load::None,
                 needs: &[Need::Times],
-                known: true,
+                known: Some(Known {
+                    hypotheses: base_step::hypotheses,
+                    misses: FIRST_ORDER,
+                    doubles: None,
+                    advice: &[Advice::Alone(Measure::OtherOrientations)],
+                }),
                 may_repeat: false,
                 neighbours: &[
                     Neighbour { kind: Kind::ToolStep, told_apart_by: OTHER_ORIENTATIONS },
@@ -400,11 +585,17 @@ impl Kind {
                 magnitude: "angle per moment about the base's origin",
                 range: Range::Everywhere([2e-8, 2e-7]),
                 source: Source::Assumed,
+                softest: TENFOLD,
                 one_signed: true,
                 sign_apart: false,
                 load: Load::Drives,
                 needs: &[Need::Masses],
-                known: true,
+                known: Some(Known {
+                    hypotheses: base_tilt::hypotheses,
+                    misses: DEFLECTED,
+                    doubles: Some(base_tilt::doubles),
+                    advice: &[],
+                }),
                 may_repeat: false,
                 neighbours: &[
                     Neighbour { kind: Kind::LinkBending, told_apart_by: ON_THE_FOOT },
@@ -420,11 +611,17 @@ impl Kind {
                 magnitude: "length of the translation",
                 range: Range::Everywhere([0.05e-3, 0.5e-3]),
                 source: Source::Assumed,
+                softest: AS_ELSEWHERE,
                 one_signed: false,
                 sign_apart: false,
                 load: Load::None,
                 needs: &[Need::Times, Need::Orientations],
-                known: true,
+                known: Some(Known {
+                    hypotheses: tool_step::hypotheses,
+                    misses: FIRST_ORDER,
+                    doubles: None,
+                    advice: &[Advice::Alone(Measure::OtherOrientations)],
+                }),
                 may_repeat: false,
                 neighbours: &[Neighbour { kind: Kind::BaseStep, told_apart_by: OTHER_ORIENTATIONS }],
                 scene: SceneKeys {
@@ -441,11 +638,12 @@ impl Kind {
                 magnitude: "relative error",
                 range: Range::Everywhere([10e-6, 100e-6]),
                 source: Source::Assumed,
+                softest: AS_ELSEWHERE,
                 one_signed: false,
                 sign_apart: false,
                 load: Load::None,
                 needs: &[],
-                known: true,
+                known: Some(Known { hypotheses: measurement_scale::hypotheses, misses: FIRST_ORDER, doubles: None, advice: &[] }),
                 may_repeat: false,
                 neighbours: &[Neighbour {
                     kind: Kind::LinkThermalGrowth,
@@ -461,11 +659,12 @@ impl Kind {
                 magnitude: "share of the readings",
                 range: Range::Everywhere([0.03, 0.15]),
                 source: Source::Assumed,
+                softest: AS_ELSEWHERE,
                 one_signed: false,
                 sign_apart: false,
                 load: Load::None,
                 needs: &[],
-                known: true,
+                known: Some(Known { hypotheses: move_nothing, misses: FIRST_ORDER, doubles: None, advice: &[] }),
                 may_repeat: false,
                 neighbours: &[],
                 scene: SceneKeys { place: ScenePlace::Nowhere, required: &["share", "factor"], optional: &[] },
@@ -478,11 +677,12 @@ impl Kind {
                 magnitude: "how far it falls behind in the middle",
                 range: Range::Everywhere([40.0 * ARCSEC, 160.0 * ARCSEC]),
                 source: Source::Assumed,
+                softest: AS_ELSEWHERE,
                 one_signed: false,
                 sign_apart: false,
                 load: Load::None,
                 needs: &[],
-                known: false,
+                known: None,
                 may_repeat: false,
                 neighbours: &[],
                 scene: SceneKeys {
@@ -499,11 +699,12 @@ impl Kind {
                 magnitude: "angle per torque that comes with time",
                 range: Range::Everywhere([0.5e-5, 5e-5]),
                 source: Source::Assumed,
+                softest: AS_ELSEWHERE,
                 one_signed: false,
                 sign_apart: false,
                 load: Load::Drives,
                 needs: &[],
-                known: false,
+                known: None,
                 may_repeat: false,
                 neighbours: &[],
                 scene: SceneKeys {
@@ -520,11 +721,12 @@ impl Kind {
                 magnitude: "angle per moment",
                 range: Range::Everywhere([0.3e-5, 3e-5]),
                 source: Source::Assumed,
+                softest: AS_ELSEWHERE,
                 one_signed: false,
                 sign_apart: false,
                 load: Load::Drives,
                 needs: &[],
-                known: false,
+                known: None,
                 may_repeat: false,
                 neighbours: &[],
                 scene: SceneKeys { place: ScenePlace::TurningJoint, required: &["gain_urad_per_nm"], optional: &[] },
@@ -537,11 +739,12 @@ impl Kind {
                 magnitude: "full width",
                 range: PLAY,
                 source: Source::Assumed,
+                softest: AS_ELSEWHERE,
                 one_signed: false,
                 sign_apart: false,
                 load: Load::None,
                 needs: &[],
-                known: false,
+                known: None,
                 may_repeat: false,
                 neighbours: &[],
                 scene: SceneKeys {
@@ -558,11 +761,12 @@ impl Kind {
                 magnitude: "true minus recorded mass",
                 range: Range::Everywhere([0.5, 3.0]),
                 source: Source::Assumed,
+                softest: AS_ELSEWHERE,
                 one_signed: false,
                 sign_apart: false,
                 load: Load::Drives,
                 needs: &[],
-                known: false,
+                known: None,
                 may_repeat: false,
                 neighbours: &[],
                 scene: SceneKeys { place: ScenePlace::Nowhere, required: &["excess_kg", "stiffness_nm_per_rad"], optional: &[] },
@@ -575,11 +779,12 @@ impl Kind {
                 magnitude: "angle per torque at no load",
                 range: SOFTNESS,
                 source: Source::Assumed,
+                softest: TENFOLD,
                 one_signed: false,
                 sign_apart: false,
                 load: Load::Drives,
                 needs: &[],
-                known: false,
+                known: None,
                 may_repeat: false,
                 neighbours: &[],
                 scene: SceneKeys {
@@ -593,12 +798,12 @@ impl Kind {
 
     /// The kinds that the diagnosis has a name for.
     pub fn known() -> impl Iterator<Item = Kind> {
-        Kind::ALL.into_iter().filter(|kind| kind.descriptor().known)
+        Kind::ALL.into_iter().filter(|kind| kind.descriptor().known.is_some())
     }
 
     /// The kinds that it has none for: outside its library on purpose.
     pub fn foreign() -> impl Iterator<Item = Kind> {
-        Kind::ALL.into_iter().filter(|kind| !kind.descriptor().known)
+        Kind::ALL.into_iter().filter(|kind| kind.descriptor().known.is_none())
     }
 
     /// Its name in scenes, options and results.
@@ -616,7 +821,7 @@ impl Kind {
     /// The kind with this name, if the diagnosis knows it.
     #[must_use]
     pub fn known_from_name(name: &str) -> Option<Kind> {
-        Kind::from_name(name).filter(|kind| kind.descriptor().known)
+        Kind::from_name(name).filter(|kind| kind.descriptor().known.is_some())
     }
 
     /// What it belongs to.
@@ -639,6 +844,9 @@ impl Kind {
     }
 }
 
+/// Outliers move nothing: readings are weighted instead.
+fn move_nothing(_: &Site<'_>, _: &mut Vec<Hypothesis>) {}
+
 impl fmt::Display for Kind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
@@ -648,6 +856,10 @@ impl fmt::Display for Kind {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::Parameters;
+    use crate::effects::signature::shape::Coefficients;
+    use crate::effects::signature::unnamed::all_yield::AllYield;
+    use crate::effects::signature::unnamed::bump::Bump;
 
     #[test]
     fn names_in_results_are_those_of_the_serialisation() {
@@ -670,11 +882,68 @@ mod tests {
                 assert!(0.0 < low && low < high, "{kind:?}");
             }
             for neighbour in of.neighbours {
-                assert!(neighbour.kind != kind && neighbour.kind.descriptor().known && !neighbour.told_apart_by.is_empty());
+                assert!(
+                    neighbour.kind != kind && neighbour.kind.descriptor().known.is_some() && !neighbour.told_apart_by.is_empty()
+                );
             }
             assert!(!(of.one_signed && of.sign_apart), "{kind:?}: what has one sign has none to tell");
-            assert!(of.known || of.neighbours.is_empty(), "{kind:?}: nothing is confused with what has no name");
+            assert!(of.softest >= 1.0, "{kind:?}");
+            for advice in of.known.iter().flat_map(|known| known.advice) {
+                let other = if let Advice::Beside(other, _) = advice { Some(*other) } else { None };
+                assert!(other.is_none_or(|other| of.neighbours.iter().any(|neighbour| neighbour.kind == other)), "{kind:?}");
+            }
+            assert!(of.known.is_some() || of.neighbours.is_empty(), "{kind:?}: nothing is confused with what has no name");
             assert!(!of.scene.required.is_empty() || !of.scene.optional.is_empty(), "{kind:?} has no magnitude in scenes");
         }
+    }
+
+    /// Other people's scripts and recordings read it.
+    #[test]
+    fn shapes_are_written_flat_whether_they_have_a_name_or_not() {
+        let written = [
+            (r#"{"shape":"torque","joint":1}"#, Shape::Torque(joint_compliance::Torque { joint: 0 })),
+            (r#"{"shape":"growth"}"#, Shape::Growth(link_thermal_growth::Growth { link: None })),
+            (r#"{"shape":"growth","link":3}"#, Shape::Growth(link_thermal_growth::Growth { link: Some(2) })),
+            (r#"{"shape":"base_drift"}"#, Shape::BaseDrift(base_drift::BaseDrift {})),
+            (r#"{"shape":"tool_step","row":7}"#, Shape::ToolStep(tool_step::ToolStep { row: 7 })),
+            (
+                r#"{"shape":"bump","joint":2,"centre":0.5,"half_width":0.3}"#,
+                Nameless::Bump(Bump { joint: 1, centre: 0.5, half_width: 0.3 }).into(),
+            ),
+            (r#"{"shape":"all_yield"}"#, Nameless::AllYield(AllYield {}).into()),
+        ];
+        for (text, shape) in written {
+            assert_eq!(serde_json::to_string(&shape).unwrap(), text);
+            assert_eq!(serde_json::from_str::<Shape>(text).unwrap(), shape);
+        }
+        let wrong = serde_json::from_str::<Shape>(r#"{"shape":"torque","joint":0}"#).unwrap_err().to_string();
+        assert!(wrong.contains("count from 1"), "{wrong}");
+    }
+
+    #[test]
+    fn the_schema_has_all_shapes_in_one_list() {
+        let schema = schemars::schema_for!(Shape);
+        let shapes = schema.get("oneOf").and_then(Value::as_array).unwrap();
+        let names: Vec<&str> = shapes.iter().filter_map(|shape| shape["properties"]["shape"]["const"].as_str()).collect();
+        assert_eq!((names.len(), shapes.len()), (35, 35), "{schema:?}");
+        assert_eq!((names[0], names[18], names[19], names[34]), ("torque", "scale", "unequal_bend", "time_curve"));
+        assert!(schema.get("anyOf").is_none());
+    }
+
+    #[test]
+    fn only_shapes_that_some_kind_has_say_how_to_make_them_happen() {
+        let bump = Shape::from(Nameless::Bump(Bump { joint: 1, centre: 0.5, half_width: 0.3 }));
+        assert_eq!(bump.values(Coefficients(&[1e-3])).unwrap_err(), "a shape without a name");
+        assert_eq!((bump.row(), bump.parameters(Coefficients(&[1e-3]))), (None, Parameters::default()));
+        let beside = Shape::from(Nameless::Bump(Bump { joint: 1, centre: 0.7, half_width: 0.1 }));
+        let far = Shape::from(Nameless::Bump(Bump { joint: 1, centre: 0.9, half_width: 0.3 }));
+        assert!(bump.overlaps(&beside) && beside.overlaps(&bump) && !bump.overlaps(&far));
+        let step = Shape::ToolStep(tool_step::ToolStep { row: 7 });
+        assert!(!bump.overlaps(&step) && !step.overlaps(&step));
+        assert_eq!(step.row(), Some(7));
+        // Without coefficients there is nothing to make.
+        assert_eq!(step.values(Coefficients(&[])).unwrap_err(), "the diagnosis lacks a coefficient");
+        let moved = &step.values(Coefficients(&[1e-3, 2e-3, 3e-3])).unwrap()[0];
+        assert_eq!((moved.translation, moved.rotation), ([1e-3, 2e-3, 3e-3].into(), [0.0; 3].into()));
     }
 }

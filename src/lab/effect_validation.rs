@@ -815,12 +815,16 @@ fn root_of_cubic(stiffness: f64, cubic: f64, torque: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::Kind;
 
     /// The marks of the issue on the arm of the main job: 2 % or 1 µm, settling error below 0.5 µm. Speed is the benchmarks'.
     #[test]
     fn every_effect_does_what_statics_says() {
         let scene = crate::scene::read(std::path::Path::new("scenes/arm8.toml")).unwrap().scene;
         let planned = session(&scene.arm, 60, 5);
+        let kinds: std::collections::BTreeSet<Kind> =
+            cases(&scene.arm).iter().flat_map(|case| &case.effects).flat_map(Effect::kinds).collect();
+        assert!(kinds.into_iter().eq(Kind::ALL), "a kind without a case");
         for case in cases(&scene.arm) {
             let line = validate(&scene, &case, &planned).unwrap();
             println!(

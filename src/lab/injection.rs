@@ -6,8 +6,6 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::Vector3;
-
 use crate::arm::Arm;
 use crate::arm::JointKind;
 use crate::effects::{Kind, Level, Location, Unit};
@@ -27,18 +25,10 @@ pub fn places(kind: Kind, arm: &Arm) -> Vec<Option<usize>> {
     }
 }
 
-/// Whether an effect of `kind` on `arm` is no other kind's as well. A base that leans does what bending of the first link does where the first
-/// joint stands upright on the base's origin: a case of one would be a case of the other.
+/// Whether an effect of `kind` on `arm` is no other kind's as well: a case of one would be a case of the other.
 #[must_use]
 pub fn is_its_own(kind: Kind, arm: &Arm) -> bool {
-    if kind != Kind::BaseTilt {
-        return true;
-    }
-    let first = arm.chain.at_nominal().segments()[0];
-    let axis = first.rotation * Vector3::z();
-    let (up, foot) = (arm.gravity_in_base.normalize(), first.translation.vector);
-    // Within a tenth of a degree and a tenth of a millimetre.
-    axis.cross(&up).norm() > 2e-3 || (foot - up * up.dot(&foot)).norm() > 1e-4
+    kind.descriptor().known.and_then(|known| known.doubles).is_none_or(|doubles| !doubles(arm))
 }
 
 /// Where an effect of `kind` at `place` (from 0) sits, as results say it.

@@ -17,19 +17,6 @@ use crate::seed::stream;
 use crate::simulation::effect::Effect;
 use crate::simulation::injected::{Injected, Noise};
 
-/// Share of a displacement that its signature may miss, and where it is more, why.
-fn allowed(kind: Kind) -> f64 {
-    match kind {
-        // A deflected arm bends its own torques.
-        Kind::JointCompliance | Kind::LinkBending | Kind::BaseTilt => 0.01,
-        // Rows in which the load that seats is as small as it is unknown, or near to what friction holds, count less.
-        Kind::GravityLostMotion | Kind::RadialClearance | Kind::TiltClearance => 0.15,
-        // The sensors of temperature are off by some hundredths of a degree.
-        Kind::LinkThermalGrowth | Kind::JointThermalDrift => 0.05,
-        _ => 0.005,
-    }
-}
-
 #[test]
 fn every_signature_is_what_physics_makes() {
     let options = Options::quiet(20e-6, 60, 0);
@@ -56,6 +43,13 @@ fn every_signature_is_what_physics_makes() {
     .unwrap();
     let known = conditions(&rows, &fitted, &[], Loads::AsItStands, None, &Model::default()).0;
     let library = library(&Mechanism::new(&scene.arm), &known.columns);
+    for one in &library {
+        let orientation = known.columns.orientation;
+        let widths = [one.spread.len(), one.shape.columns(&known.readings[0], orientation).len()];
+        assert_eq!(widths, [one.shape.width(orientation); 2], "{one:?}");
+        assert!(one.kind.is_some() || one.shape.unnamed().is_some(), "{one:?} has neither a name nor a family");
+        assert!(one.shape.magnitude_width() <= widths[0]);
+    }
     for kind in Kind::known() {
         for place in places(kind, &scene.arm) {
             let magnitude = kind.range(place, scene.arm.joint_count())[1];
@@ -90,7 +84,7 @@ fn every_signature_is_what_physics_makes() {
             let Some(left) = best else {
                 panic!("{kind:?} {place:?} is not in the library");
             };
-            if left > allowed(kind) && size > 1e-6 {
+            if left > kind.descriptor().known.unwrap().misses.fitted && size > 1e-6 {
                 wrong.push(format!("{kind:?} {place:?}: {:.2} % of the displacement is not in the signature", 100.0 * left));
             }
         }

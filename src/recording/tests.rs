@@ -20,6 +20,7 @@ use crate::diagnosis::outcome::{
     self, Blocked, Candidate, Diagnosis, Effect, Gap, LeftOut, Magnitude, Map, MinimumDetectable, NoiseFloor, NoiseSource,
     Parameters, Place, Signature, Undetectable, Unknown, Verdict,
 };
+use crate::effects::kind::joint_eccentricity::Harmonic;
 use crate::effects::signature::shape;
 use crate::effects::{Kind, Level};
 use crate::event::RealCell;
@@ -243,7 +244,7 @@ fn diagnosis(stream: &mut Stream, readings: usize) -> Diagnosis {
         },
         parameters,
         signature: Some(Signature {
-            shape: shape::Shape::Harmonic { joint: 2, order: 2.0 },
+            shape: shape::Shape::Harmonic(Harmonic { joint: 2, order: 2.0 }),
             coefficients: vec![stream.uniform(0.0, 1e-3), -0.0],
         }),
         held_out_rms_before_m: stream.uniform(0.0, 1e-3),

@@ -294,17 +294,7 @@ fn advice(advice: &Advice) -> String {
                 numbers(joints, ", ")
             );
         }
-        Advice::LoadSideways => {
-            "compliance or bending: load the arm sideways, tilt the base, or put a target on a link in between"
-        }
-        Advice::SeveralPayloads => {
-            "linear and saturating effects of load look alike under one payload: the same configurations with two or three payloads"
-        }
-        Advice::HeatAndCool => {
-            "temperature or time: heat and cool in one session, so that temperatures return while time goes on"
-        }
-        Advice::WholeTravel => "harmonics of a joint: move it through its whole travel, other joints at rest",
-        Advice::OtherOrientation => "base or tool: read the same few configurations again with another orientation of the tool",
+        Advice::Measure(measure) => measure.words(),
         Advice::MoreWhereItShows => "a shape without a name: more configurations where it shows",
         Advice::RecordApproach => {
             "backlash could not show: record from which side each joint was approached (columns approach1, …), and use both sides"

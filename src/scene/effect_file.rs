@@ -8,7 +8,7 @@ use super::error::{Invalid, suggestion};
 use super::file::{EffectToml, OneOrEach};
 use crate::arm::Arm;
 use crate::arm::JointKind;
-use crate::effects::{Kind, SceneKeys, ScenePlace};
+use crate::effects::{Foot, Kind, SceneKeys, ScenePlace};
 use crate::simulation::effect::{Effect, Growing, Values};
 use crate::units::ARCSEC;
 
@@ -98,10 +98,12 @@ fn values(file: &EffectToml, key: &str, place: Option<usize>, arm: &Arm) -> Chec
         source,
         // A list of them is read by itself.
         expansion: 0.0,
+        foot: Foot::default(),
         drift: signed("drift_urad_per_k", file.drift_urad_per_k, 1e4)? / 1e6,
         radial: given("radial_um", file.radial_um, not_negative, LARGEST_SHIFT_UM)? / 1e6,
         axial: given("axial_um", file.axial_um, not_negative, LARGEST_SHIFT_UM)? / 1e6,
         tilt: given("tilt_urad", file.tilt_urad, not_negative, LARGEST_TURN_URAD)? / 1e6,
+        held: None,
         moves: file.moves.unwrap_or_default(),
         translation: vector("translation_um", file.translation_um, 5e4)?,
         rotation: vector("rotation_urad", file.rotation_urad, 5e4)?,

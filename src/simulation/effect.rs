@@ -8,6 +8,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::Vector3;
 
 use crate::arm::Arm;
+pub use crate::effects::values::{Foot, Moves, Values};
 use crate::effects::{Kind, Level, Location};
 use crate::seed::Stream;
 
@@ -215,95 +216,6 @@ pub enum Growing {
     Arm(Foot),
 }
 
-/// How the foot grows with the arm: from the base link's frame to the first joint.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Foot {
-    /// With its own temperature.
-    Own,
-    /// As warm as the first link that moves.
-    AsFirstLink,
-    /// Not at all.
-    Still,
-}
-
-/// What a drift or a step of the measurement frame moves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Moves {
-    /// The robot's base.
-    #[default]
-    Base,
-    /// The sensor.
-    Sensor,
-}
-
-/// What a scene gives of an effect besides kind and place, SI; zero where it says nothing.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Values {
-    /// N·m/rad
-    pub stiffness: f64,
-    /// N·m/rad³
-    pub cubic: f64,
-    /// rad/(N·m)
-    pub compliance: f64,
-    /// Whether a link bends as a beam.
-    pub beam: bool,
-    /// rad/(N·m)
-    pub gain: f64,
-    /// Full width of a play, rad.
-    pub width: f64,
-    /// rad
-    pub amplitude: f64,
-    /// Periods per turn.
-    pub order: u8,
-    /// rad
-    pub phase: f64,
-    /// Gear ratio.
-    pub ratio: f64,
-    /// rad/rad
-    pub ratio_error: f64,
-    /// rad/rad
-    pub coupling: f64,
-    /// Joint whose motion leaks, from 0.
-    pub source: usize,
-    /// 1/K
-    pub expansion: f64,
-    /// rad/K
-    pub drift: f64,
-    /// m
-    pub radial: f64,
-    /// m
-    pub axial: f64,
-    /// rad
-    pub tilt: f64,
-    /// What a drift or a step moves.
-    pub moves: Moves,
-    /// m
-    pub translation: Vector3<f64>,
-    /// Rotation vector, rad.
-    pub rotation: Vector3<f64>,
-    /// Share of the session.
-    pub after: f64,
-    /// Relative error.
-    pub scale: f64,
-    /// Share of the readings.
-    pub share: f64,
-    /// Of the noise.
-    pub factor: f64,
-    /// rad
-    pub depth: f64,
-    /// rad
-    pub centre: f64,
-    /// rad
-    pub half_width: f64,
-    /// s
-    pub time_constant: f64,
-    /// rad
-    pub travel: f64,
-    /// kg
-    pub excess: f64,
-}
-
 impl Effect {
     /// The effect of `kind` at joint or link `place` (from 0; `None` for what has no number) with these values.
     #[must_use]
@@ -321,7 +233,10 @@ impl Effect {
                 let Values { ratio_error, coupling, source, .. } = *values;
                 Effect::GearCoupling { joint, ratio_error, coupling, source }
             }
-            Kind::LinkThermalGrowth => Effect::LinkThermalGrowth { of: Growing::of(place), expansion: values.expansion },
+            Kind::LinkThermalGrowth => {
+                let of = place.map_or(Growing::Arm(values.foot), Growing::Link);
+                Effect::LinkThermalGrowth { of, expansion: values.expansion }
+            }
             Kind::JointThermalDrift => Effect::JointThermalDrift { joint, drift: values.drift },
             Kind::RadialClearance | Kind::TiltClearance => Effect::clearance(joint, values),
             Kind::BaseDrift => Effect::BaseDrift { moves, translation, rotation },
@@ -345,7 +260,7 @@ impl Effect {
     /// All plays of a bearing together.
     #[must_use]
     pub fn clearance(joint: usize, values: &Values) -> Effect {
-        Effect::Clearance { joint, radial: values.radial, axial: values.axial, tilt: values.tilt, held: None }
+        Effect::Clearance { joint, radial: values.radial, axial: values.axial, tilt: values.tilt, held: values.held }
     }
 
     /// The effect of this magnitude (SI, positive, as [`Kind::unit`] has it) at `place`; what else it has is drawn from `stream`, as
@@ -430,95 +345,126 @@ impl Effect {
     /// Its kind; a clearance may be of several, or of none.
     #[must_use]
     pub fn kinds(&self) -> Vec<Kind> {
-        let one = match self {
-            Effect::JointCompliance { .. } => Kind::JointCompliance,
-            Effect::LinkBending { .. } => Kind::LinkBending,
-            Effect::Backlash { .. } => Kind::Backlash,
-            Effect::GravityLostMotion { .. } => Kind::GravityLostMotion,
-            Effect::JointEccentricity { .. } => Kind::JointEccentricity,
-            Effect::StrainWaveError { .. } => Kind::StrainWaveError,
-            Effect::GearCoupling { .. } => Kind::GearCoupling,
-            Effect::LinkThermalGrowth { .. } => Kind::LinkThermalGrowth,
-            Effect::JointThermalDrift { .. } => Kind::JointThermalDrift,
-            Effect::Clearance { radial, tilt, .. } => {
-                let radial = (*radial > 0.0).then_some(Kind::RadialClearance);
-                return radial.into_iter().chain((*tilt > 0.0).then_some(Kind::TiltClearance)).collect();
-            }
-            Effect::BaseDrift { .. } => Kind::BaseDrift,
-            Effect::BaseStep { .. } => Kind::BaseStep,
-            Effect::BaseTilt { .. } => Kind::BaseTilt,
-            Effect::ToolStep { .. } => Kind::ToolStep,
-            Effect::MeasurementScale { .. } => Kind::MeasurementScale,
-            Effect::MeasurementOutliers { .. } => Kind::MeasurementOutliers,
-            Effect::WornToothSector { .. } => Kind::WornToothSector,
-            Effect::CreepAfterMotion { .. } => Kind::CreepAfterMotion,
-            Effect::MomentCrosstalk { .. } => Kind::MomentCrosstalk,
-            Effect::MemoryHysteresis { .. } => Kind::MemoryHysteresis,
-            Effect::WrongPayload { .. } => Kind::WrongPayload,
-            Effect::HardeningStiffness { .. } => Kind::HardeningStiffness,
-        };
-        vec![one]
+        self.described().kinds
     }
 
     /// Where it sits.
     #[must_use]
     pub fn location(&self) -> Location {
-        let at = |level, index: usize| Location { level, index: Some(index + 1) };
-        let of = |level| Location { level, index: None };
-        match self {
-            Effect::JointCompliance { joint, .. }
-            | Effect::Backlash { joint, .. }
-            | Effect::GravityLostMotion { joint, .. }
-            | Effect::JointEccentricity { joint, .. }
-            | Effect::StrainWaveError { joint, .. }
-            | Effect::GearCoupling { joint, .. }
-            | Effect::JointThermalDrift { joint, .. }
-            | Effect::Clearance { joint, .. }
-            | Effect::WornToothSector { joint, .. }
-            | Effect::CreepAfterMotion { joint, .. }
-            | Effect::MomentCrosstalk { joint, .. }
-            | Effect::MemoryHysteresis { joint, .. }
-            | Effect::HardeningStiffness { joint, .. } => at(Level::Joint, *joint),
-            Effect::LinkBending { link, .. } | Effect::LinkThermalGrowth { of: Growing::Link(link), .. } => {
-                at(Level::Link, *link)
-            }
-            Effect::LinkThermalGrowth { of: Growing::Arm(_), .. } => of(Level::Link),
-            Effect::BaseDrift { .. } | Effect::BaseStep { .. } | Effect::BaseTilt { .. } => of(Level::Base),
-            Effect::ToolStep { .. } | Effect::WrongPayload { .. } => of(Level::Tool),
-            Effect::MeasurementScale { .. } | Effect::MeasurementOutliers { .. } => of(Level::Sensor),
-        }
+        let Described { kinds, place, .. } = self.described();
+        // A clearance that has no kind is a joint's.
+        let level = kinds.first().map_or(Level::Joint, |kind| kind.level());
+        Location { level, index: place.map(|place| place + 1) }
     }
 
     /// Its magnitude in the unit of its kind, positive; of a clearance, of the part that `kind` names.
     #[must_use]
     pub fn magnitude(&self, kind: Option<Kind>) -> f64 {
         match self {
-            Effect::JointCompliance { stiffness, .. } | Effect::HardeningStiffness { stiffness, .. } => 1.0 / stiffness,
-            Effect::LinkBending { compliance, .. }
-            | Effect::CreepAfterMotion { compliance, .. }
-            | Effect::BaseTilt { compliance } => *compliance,
-            Effect::Backlash { width, .. } | Effect::GravityLostMotion { width, .. } => *width,
-            Effect::JointEccentricity { amplitude, .. } | Effect::StrainWaveError { amplitude, .. } => amplitude.abs(),
-            Effect::GearCoupling { ratio_error, coupling, .. } => ratio_error.abs().max(coupling.abs()),
-            Effect::LinkThermalGrowth { expansion, .. } => expansion.abs(),
-            Effect::JointThermalDrift { drift, .. } => drift.abs(),
-            Effect::Clearance { radial, tilt, .. } => {
-                if kind == Some(Kind::TiltClearance) {
-                    *tilt
-                } else {
-                    *radial
-                }
-            }
-            Effect::BaseDrift { translation, .. }
-            | Effect::BaseStep { translation, .. }
-            | Effect::ToolStep { translation, .. } => translation.norm(),
-            Effect::MeasurementScale { scale } => scale.abs(),
-            Effect::MeasurementOutliers { share, .. } => *share,
-            Effect::WornToothSector { depth, .. } => *depth,
-            Effect::MomentCrosstalk { gain, .. } => gain.abs(),
-            Effect::MemoryHysteresis { amplitude, .. } => 2.0 * amplitude,
-            Effect::WrongPayload { excess, .. } => excess.abs(),
+            Effect::Clearance { tilt, .. } if kind == Some(Kind::TiltClearance) => *tilt,
+            effect => effect.described().magnitude,
         }
+    }
+
+    /// What it is, where, and in numbers.
+    #[must_use]
+    pub fn described(&self) -> Described {
+        let of = |kind, place, size: f64| Described {
+            kinds: vec![kind],
+            place,
+            size,
+            magnitude: size.abs(),
+            moves_joint: false,
+            more: Vec::new(),
+        };
+        let at = |kind, joint, size| of(kind, Some(joint), size);
+        let moving = |kind, joint, size| Described { moves_joint: true, ..at(kind, joint, size) };
+        let twist = |kind, translation: Vector3<f64>, rotation: Vector3<f64>| Described {
+            more: vec![("rotation_rad", rotation.norm())],
+            ..of(kind, None, translation.norm())
+        };
+        match *self {
+            Effect::JointCompliance { joint, stiffness } => moving(Kind::JointCompliance, joint, 1.0 / stiffness),
+            Effect::LinkBending { link, compliance, .. } => at(Kind::LinkBending, link, compliance),
+            Effect::Backlash { joint, width } => moving(Kind::Backlash, joint, width),
+            Effect::GravityLostMotion { joint, width } => moving(Kind::GravityLostMotion, joint, width),
+            Effect::JointEccentricity { joint, amplitude, order, phase } => {
+                at(Kind::JointEccentricity, joint, amplitude).with("order", f64::from(order)).with("phase", phase)
+            }
+            Effect::StrainWaveError { joint, amplitude, ratio, phase } => {
+                at(Kind::StrainWaveError, joint, amplitude).with("ratio", ratio).with("phase", phase)
+            }
+            Effect::GearCoupling { joint, ratio_error, coupling, source } => {
+                let largest = ratio_error.abs().max(coupling.abs());
+                let one = at(Kind::GearCoupling, joint, largest).with("ratio_error", ratio_error).with("coupling", coupling);
+                one.with("source", source as f64 + 1.0)
+            }
+            Effect::LinkThermalGrowth { of: Growing::Link(link), expansion } => at(Kind::LinkThermalGrowth, link, expansion),
+            Effect::LinkThermalGrowth { of: Growing::Arm(_), expansion } => of(Kind::LinkThermalGrowth, None, expansion),
+            Effect::JointThermalDrift { joint, drift } => at(Kind::JointThermalDrift, joint, drift),
+            Effect::Clearance { joint, radial, axial, tilt, .. } => {
+                let kinds = [(radial, Kind::RadialClearance), (tilt, Kind::TiltClearance)];
+                let kinds = kinds.into_iter().filter(|(play, _)| *play > 0.0).map(|(_, kind)| kind).collect();
+                let size = if radial == 0.0 && tilt > 0.0 { tilt } else { radial };
+                let one = Described { kinds, magnitude: radial, ..at(Kind::RadialClearance, joint, size) };
+                one.with("radial_m", radial).with("axial_m", axial).with("tilt_rad", tilt)
+            }
+            Effect::BaseDrift { translation, rotation, .. } => twist(Kind::BaseDrift, translation, rotation),
+            Effect::BaseStep { translation, rotation, after, .. } => {
+                twist(Kind::BaseStep, translation, rotation).with("after", after)
+            }
+            Effect::BaseTilt { compliance } => of(Kind::BaseTilt, None, compliance),
+            Effect::ToolStep { translation, rotation, after } => {
+                twist(Kind::ToolStep, translation, rotation).with("after", after)
+            }
+            Effect::MeasurementScale { scale } => of(Kind::MeasurementScale, None, scale),
+            Effect::MeasurementOutliers { share, factor } => of(Kind::MeasurementOutliers, None, share).with("factor", factor),
+            Effect::WornToothSector { joint, depth, centre, half_width } => {
+                at(Kind::WornToothSector, joint, depth).with("centre", centre).with("half_width", half_width)
+            }
+            Effect::CreepAfterMotion { joint, compliance, time_constant } => {
+                moving(Kind::CreepAfterMotion, joint, compliance).with("time_constant_s", time_constant)
+            }
+            Effect::MomentCrosstalk { joint, gain } => at(Kind::MomentCrosstalk, joint, gain),
+            Effect::MemoryHysteresis { joint, amplitude, travel } => {
+                let half = moving(Kind::MemoryHysteresis, joint, amplitude).with("travel", travel);
+                Described { magnitude: 2.0 * amplitude, ..half }
+            }
+            Effect::WrongPayload { excess, stiffness } => of(Kind::WrongPayload, None, excess).with("stiffness", stiffness),
+            Effect::HardeningStiffness { joint, stiffness, cubic } => {
+                moving(Kind::HardeningStiffness, joint, 1.0 / stiffness).with("cubic", cubic)
+            }
+        }
+    }
+}
+
+/// What an effect is, where, and in numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Described {
+    /// Its kind; a clearance may be of several, or of none.
+    pub kinds: Vec<Kind>,
+    /// Joint or link, from 0; `None` for the whole arm and for what has no number.
+    pub place: Option<usize>,
+    /// How large it is, as a truth file writes it: with its sign, of a memory half of its width, of a clearance the radius of what it has.
+    pub size: f64,
+    /// How large it is, in the convention of [`Kind::unit`]: positive; of a clearance, the radial one.
+    pub magnitude: f64,
+    /// Whether it is a motion of the joint itself, so that metres stand for radians where the joint slides.
+    pub moves_joint: bool,
+    /// What else describes it, by name, SI.
+    pub more: Vec<(&'static str, f64)>,
+}
+
+impl Described {
+    fn with(mut self, name: &'static str, value: f64) -> Described {
+        self.more.push((name, value));
+        self
+    }
+
+    /// What else describes it by this name.
+    #[must_use]
+    pub fn value(&self, name: &str) -> Option<f64> {
+        self.more.iter().find(|(known, _)| *known == name).map(|(_, value)| *value)
     }
 }
 

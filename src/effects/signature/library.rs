@@ -1,14 +1,10 @@
 //! What is looked for: every kind at every place, and shapes that have no name.
 
 use super::posture::Mechanism;
-pub use super::radial_clearance::HELD;
 use super::shape::Shape;
-pub use super::strain_wave_error::{RIPPLES, WAVES_PER_TURN, ripple};
-use super::{
-    backlash, base_drift, base_step, base_tilt, gear_coupling, gravity_lost_motion, joint_compliance, joint_eccentricity,
-    joint_thermal_drift, link_bending, link_thermal_growth, measurement_scale, radial_clearance, strain_wave_error,
-    tilt_clearance, tool_step, unnamed,
-};
+use super::unnamed;
+pub use crate::effects::kind::radial_clearance::HELD;
+pub use crate::effects::kind::strain_wave_error::{RIPPLES, WAVES_PER_TURN, ripple};
 use crate::effects::{Kind, Level, Load, Location};
 
 /// Something that may be there.
@@ -55,11 +51,11 @@ pub struct Columns {
 /// A place of an arm at which effects may sit, and what the data have.
 pub struct Site<'a> {
     /// Joint, or the link that it moves, from 0; `None` for the whole arm and for what has no number.
-    pub(super) place: Option<usize>,
+    pub(in crate::effects) place: Option<usize>,
     /// The arm.
-    pub(super) mechanism: &'a Mechanism,
+    pub(in crate::effects) mechanism: &'a Mechanism,
     /// What the data have.
-    pub(super) columns: &'a Columns,
+    pub(in crate::effects) columns: &'a Columns,
 }
 
 /// Without masses each link is taken to weigh 1 kg, a tenth of what it does: what load drives looks as many times larger.
@@ -67,22 +63,22 @@ const WITHOUT_MASSES: f64 = 10.0;
 
 impl Site<'_> {
     /// Number of joints of the arm.
-    pub(super) fn joints(&self) -> usize {
+    pub(in crate::effects) fn joints(&self) -> usize {
         self.mechanism.joint_count()
     }
 
     /// Whether it is a joint that turns.
-    pub(super) fn turns(&self) -> bool {
+    pub(in crate::effects) fn turns(&self) -> bool {
         self.place.is_some_and(|joint| !self.mechanism.slides[joint])
     }
 
     /// Realistic magnitudes of `kind` here.
-    pub(super) fn range(&self, kind: Kind) -> [f64; 2] {
+    pub(in crate::effects) fn range(&self, kind: Kind) -> [f64; 2] {
         kind.range(self.place, self.joints())
     }
 
     /// That an effect of `kind` is here: one column, as likely as all others of its kind at this place.
-    pub(super) fn hypothesis(&self, kind: Kind, shape: Shape) -> Hypothesis {
+    pub(in crate::effects) fn hypothesis(&self, kind: Kind, shape: Shape) -> Hypothesis {
         let location = Location { level: kind.level(), index: self.place.map(|place| place + 1) };
         let unknown_load = kind.descriptor().load == Load::Drives && !self.mechanism.masses_known;
         let range = self.range(kind).map(|magnitude| if unknown_load { WITHOUT_MASSES * magnitude } else { magnitude });
@@ -90,15 +86,21 @@ impl Site<'_> {
     }
 
     /// That a shape without a name is at this joint.
-    pub(super) fn unnamed(&self, shape: Shape, range: [f64; 2], spread: Vec<f64>, detail: String) -> Hypothesis {
+    pub(in crate::effects) fn unnamed(
+        &self,
+        shape: impl Into<Shape>,
+        range: [f64; 2],
+        spread: Vec<f64>,
+        detail: String,
+    ) -> Hypothesis {
         let location = Location { level: Level::Joint, index: self.place.map(|place| place + 1) };
-        Hypothesis { kind: None, location, shape, range, spread, detail, share: None }
+        Hypothesis { kind: None, location, shape: shape.into(), range, spread, detail, share: None }
     }
 }
 
 /// Of the columns of a twist, their standard deviations in units of its translation: one of so many metres comes with a rotation of up
 /// to as many radians. Of a tool whose orientation is not measured only the translation can be seen.
-pub(super) fn twist_spread(rotation: bool) -> Vec<f64> {
+pub(in crate::effects) fn twist_spread(rotation: bool) -> Vec<f64> {
     let third = 1.0 / libm::sqrt(3.0);
     let rotations = if rotation { vec![0.6 * third; 3] } else { Vec::new() };
     [vec![third; 3], rotations].concat()
@@ -110,41 +112,10 @@ pub fn library(mechanism: &Mechanism, columns: &Columns) -> Vec<Hypothesis> {
     let mut all = Vec::new();
     for place in (0..mechanism.joint_count()).map(Some).chain([None]) {
         let site = Site { place, mechanism, columns };
-        for kind in Kind::ALL {
-            hypotheses(kind, &site, &mut all);
+        for known in Kind::ALL.into_iter().filter_map(|kind| kind.descriptor().known) {
+            (known.hypotheses)(&site, &mut all);
         }
         unnamed::hypotheses(&site, &mut all);
     }
     all
-}
-
-/// Those of `kind` at `site`; none where it cannot sit there, or where the data lack what it takes to see it.
-fn hypotheses(kind: Kind, site: &Site<'_>, all: &mut Vec<Hypothesis>) {
-    match kind {
-        Kind::JointCompliance => joint_compliance::hypotheses(site, all),
-        Kind::LinkBending => link_bending::hypotheses(site, all),
-        Kind::Backlash => backlash::hypotheses(site, all),
-        Kind::GravityLostMotion => gravity_lost_motion::hypotheses(site, all),
-        Kind::JointEccentricity => joint_eccentricity::hypotheses(site, all),
-        Kind::StrainWaveError => strain_wave_error::hypotheses(site, all),
-        Kind::GearCoupling => gear_coupling::hypotheses(site, all),
-        Kind::LinkThermalGrowth => link_thermal_growth::hypotheses(site, all),
-        Kind::JointThermalDrift => joint_thermal_drift::hypotheses(site, all),
-        Kind::RadialClearance => radial_clearance::hypotheses(site, all),
-        Kind::TiltClearance => tilt_clearance::hypotheses(site, all),
-        Kind::BaseDrift => base_drift::hypotheses(site, all),
-        Kind::BaseStep => base_step::hypotheses(site, all),
-        Kind::BaseTilt => base_tilt::hypotheses(site, all),
-        Kind::ToolStep => tool_step::hypotheses(site, all),
-        Kind::MeasurementScale => measurement_scale::hypotheses(site, all),
-        // They move nothing: readings are weighted instead.
-        Kind::MeasurementOutliers => {}
-        // Not known to the diagnosis, on purpose.
-        Kind::WornToothSector
-        | Kind::CreepAfterMotion
-        | Kind::MomentCrosstalk
-        | Kind::MemoryHysteresis
-        | Kind::WrongPayload
-        | Kind::HardeningStiffness => {}
-    }
 }

@@ -61,7 +61,7 @@ pub struct Options {
     /// Effects outside the analyser's library beside those drawn from `kinds`.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub outside: usize,
-    /// Magnitudes up to those of hobby and cable-driven arms ([`softest`]).
+    /// Magnitudes up to those of hobby and cable-driven arms ([`Descriptor::softest`](crate::effects::Descriptor::softest)).
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub soft: bool,
 }
@@ -69,36 +69,6 @@ pub struct Options {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for it so")]
 fn is_zero(number: &usize) -> bool {
     *number == 0
-}
-
-/// How many times the upper end of its realistic range a kind reaches on hobby and cable-driven arms: joints that yield by a degree under
-/// their load, gears with one to two degrees of play, encoders and gears ten times worse (assumed).
-#[must_use]
-pub fn softest(kind: Kind) -> f64 {
-    match kind {
-        Kind::Backlash | Kind::GravityLostMotion => 60.0,
-        Kind::JointCompliance
-        | Kind::LinkBending
-        | Kind::HardeningStiffness
-        | Kind::JointEccentricity
-        | Kind::StrainWaveError
-        | Kind::GearCoupling
-        | Kind::RadialClearance
-        | Kind::TiltClearance
-        | Kind::BaseTilt => 10.0,
-        Kind::LinkThermalGrowth
-        | Kind::JointThermalDrift
-        | Kind::BaseDrift
-        | Kind::BaseStep
-        | Kind::ToolStep
-        | Kind::MeasurementScale
-        | Kind::MeasurementOutliers
-        | Kind::WornToothSector
-        | Kind::CreepAfterMotion
-        | Kind::MomentCrosstalk
-        | Kind::MemoryHysteresis
-        | Kind::WrongPayload => 1.0,
-    }
 }
 
 impl Options {
@@ -295,7 +265,7 @@ pub fn hidden(public: &Public, options: &Options, key: &[u8; 32], index: usize) 
         let places = places(kind, arm);
         let place = places[stream.index(places.len())];
         let [low, high] = kind.range(place, arm.joint_count());
-        let high = if options.soft { high * softest(kind) } else { high };
+        let high = if options.soft { high * kind.descriptor().softest } else { high };
         let magnitude = low * libm::pow(high / low, stream.unit());
         let effect = Effect::drawn(kind, place, magnitude, arm, &mut stream);
         // The same twice would be one of another size; there may be too few others.
@@ -339,16 +309,13 @@ pub fn measured(public: &Public, hidden: &Hidden, index: usize) -> Result<(Vec<M
         .zip(&injected.effects)
         .map(|(kind, effect)| TrueEffect {
             kind: kind.name().to_owned(),
-            known: kind.descriptor().known,
+            known: kind.descriptor().known.is_some(),
             location: effect.location(),
             magnitude: effect.magnitude(Some(*kind)),
             unit: kind.unit().to_owned(),
             lambda: None,
             signal: None,
-            after: match effect {
-                Effect::BaseStep { after, .. } | Effect::ToolStep { after, .. } => Some(*after),
-                _ => None,
-            },
+            after: effect.described().value("after"),
             detail: format!("{effect:?}"),
         })
         .collect();

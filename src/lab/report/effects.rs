@@ -14,7 +14,7 @@ use crate::units::number;
 pub fn library() -> String {
     let row = |kind: Kind| {
         let of = kind.descriptor();
-        let named = if of.known { "yes" } else { "no" };
+        let named = if of.known.is_some() { "yes" } else { "no" };
         let needs = needs(kind);
         [of.name, place(of.level), of.unit.name(), of.magnitude, &range(of.range), &needs, named].map(str::to_owned).to_vec()
     };
@@ -56,7 +56,7 @@ pub fn library_json() -> Value {
             "source": of.source.words(),
             "needs": of.needs.iter().map(|need| need.words()).collect::<Vec<_>>(),
             "one_signed": of.one_signed,
-            "known_to_the_diagnosis": of.known,
+            "known_to_the_diagnosis": of.known.is_some(),
             "neighbours": neighbours
                 .map(|other| json!({ "kind": other.kind.name(), "told_apart_by": other.told_apart_by }))
                 .collect::<Vec<_>>(),

@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::arm::Arm;
 use crate::arm::{JointKind, Quantity};
-use crate::effects::Level;
+use crate::effects::{Level, Unit};
 use crate::seed::{Stream, hidden_key, hidden_stream};
-use crate::simulation::effect::Effect;
+use crate::simulation::effect::{Described, Effect};
 use crate::simulation::injected::Injected;
 use crate::simulation::physics::{Seat, SeatedBy, Settled, Yield};
 
@@ -48,54 +48,20 @@ pub struct TrueEffect {
 impl TrueEffect {
     fn new(arm: &Arm, effect: &Effect) -> Self {
         let location = effect.location();
-        let turns = location.index.is_none_or(|number| {
-            location.level != Level::Joint
-                || arm.chain.joints.get(number - 1).is_none_or(|joint| joint.kind == JointKind::Revolute)
-        });
-        let (angle, compliance) = if turns { ("rad", "rad/(N·m)") } else { ("m", "m/N") };
-        let (magnitude, unit, more): (f64, &str, Vec<(&str, f64)>) = match effect {
-            Effect::JointCompliance { stiffness, .. } => (1.0 / stiffness, compliance, vec![]),
-            Effect::LinkBending { compliance, .. } => (*compliance, "rad/(N·m)", vec![]),
-            Effect::Backlash { width, .. } | Effect::GravityLostMotion { width, .. } => (*width, angle, vec![]),
-            Effect::JointEccentricity { amplitude, order, phase, .. } => {
-                (*amplitude, "rad", vec![("order", f64::from(*order)), ("phase", *phase)])
-            }
-            Effect::StrainWaveError { amplitude, ratio, phase, .. } => {
-                (*amplitude, "rad", vec![("ratio", *ratio), ("phase", *phase)])
-            }
-            Effect::GearCoupling { ratio_error, coupling, source, .. } => {
-                let more = vec![("ratio_error", *ratio_error), ("coupling", *coupling), ("source", *source as f64 + 1.0)];
-                (ratio_error.abs().max(coupling.abs()), "rad/rad", more)
-            }
-            Effect::LinkThermalGrowth { expansion, .. } => (*expansion, "1/K", vec![]),
-            Effect::JointThermalDrift { drift, .. } => (*drift, "rad/K", vec![]),
-            Effect::Clearance { radial, axial, tilt, .. } => {
-                let more = vec![("radial_m", *radial), ("axial_m", *axial), ("tilt_rad", *tilt)];
-                if *radial == 0.0 && *tilt > 0.0 { (*tilt, "rad", more) } else { (*radial, "m", more) }
-            }
-            Effect::BaseDrift { translation, rotation, .. } => (translation.norm(), "m", vec![("rotation_rad", rotation.norm())]),
-            Effect::BaseStep { translation, rotation, after, .. } | Effect::ToolStep { translation, rotation, after } => {
-                (translation.norm(), "m", vec![("rotation_rad", rotation.norm()), ("after", *after)])
-            }
-            Effect::BaseTilt { compliance } => (*compliance, "rad/(N·m)", vec![]),
-            Effect::MeasurementScale { scale } => (*scale, "1", vec![]),
-            Effect::MeasurementOutliers { share, factor } => (*share, "1", vec![("factor", *factor)]),
-            Effect::WornToothSector { depth, centre, half_width, .. } => {
-                (*depth, "rad", vec![("centre", *centre), ("half_width", *half_width)])
-            }
-            Effect::CreepAfterMotion { compliance: creep, time_constant, .. } => {
-                (*creep, compliance, vec![("time_constant_s", *time_constant)])
-            }
-            Effect::MomentCrosstalk { gain, .. } => (*gain, "rad/(N·m)", vec![]),
-            Effect::MemoryHysteresis { amplitude, travel, .. } => (*amplitude, angle, vec![("travel", *travel)]),
-            Effect::WrongPayload { excess, stiffness } => (*excess, "kg", vec![("stiffness", *stiffness)]),
-            Effect::HardeningStiffness { stiffness, cubic, .. } => (1.0 / stiffness, compliance, vec![("cubic", *cubic)]),
+        let Described { kinds, place, size, moves_joint, more, .. } = effect.described();
+        let slides = place.and_then(|joint| arm.chain.joints.get(joint)).is_some_and(|joint| joint.kind != JointKind::Revolute);
+        // Of a clearance, the play whose size it is; one along the axis alone has no kind.
+        let unit = kinds.first().map_or(Unit::Metre, |kind| kind.descriptor().unit);
+        let unit = match unit {
+            Unit::Radian if moves_joint && slides => "m",
+            Unit::RadianPerNewtonMetre if moves_joint && slides => "m/N",
+            unit => unit.name(),
         };
         TrueEffect {
             kind: effect.name().to_owned(),
             level: location.level,
             number: location.index,
-            magnitude,
+            magnitude: size,
             unit: unit.to_owned(),
             more: more.into_iter().map(|(name, value)| (name.to_owned(), value)).collect(),
         }

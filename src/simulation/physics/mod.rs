@@ -3,22 +3,14 @@
 //! What is true and hidden from the identification becomes physics here: parameter errors are in the joint frames, and every
 //! [`Effect`](crate::simulation::effect::Effect) of the arm happens by a mechanism of its own, never by adding its formula to the pose:
 //!
-//! | effect | mechanism |
-//! |---|---|
-//! | joint compliance | a free coordinate about the joint's axis with rapier's passive spring; the payload is a point mass in the multibody |
-//! | wrong payload | the same in every joint, the springs relaxed where a servo that knows the believed payload would put them |
-//! | hardening stiffness | the same with the tangent of its spring, renewed every step |
-//! | link bending | two springs across the axis (a Cardan joint) at the joint, outboard of its motion; of a beam, two such pairs along it |
-//! | creep | a spring and a damper beside it, stepped exactly over each stop of the session |
-//! | backlash | output between two stops of the motor's, held by rapier's friction; the last of the move is driven |
-//! | gravity lost motion, clearances | free, limited coordinates that gravity seats |
-//! | eccentricity | an encoder disc off its axis, or behind a Hooke joint; the servo turns until the head reads the command |
-//! | strain-wave error, gear coupling, worn teeth | gear train from motor to output |
-//! | memory hysteresis | Dahl's friction, exact for each straight move of the session |
-//! | moment crosstalk | the servo adds what its torque sensor reads of the moment across, until both agree |
-//! | thermal growth and drift | segments that scale, encoder zeros that move |
-//! | base tilt | the root frame leans under the moment of what it carries, until both agree |
-//! | base and tool | the root frame moves in the world (gravity does not), the tool moves on its link |
+//! - a gear train from motor to output, with an encoder that may be off its axis: eccentricity, strain-wave error, coupling, worn teeth;
+//! - free coordinates in series, each with a spring, a damper, stops or friction: compliance, hardening, bending, creep, backlash, lost
+//!   motion, clearances, hysteresis; the payload is a point mass in the multibody;
+//! - segments that scale and encoder zeros that move with temperature;
+//! - a root frame that moves or leans in the world (gravity does not), a tool that moves on its link;
+//! - servos that answer to what their sensors read.
+//!
+//! How exactly is said at the top of each file in `mechanism`, one per kind.
 //!
 //! What the sensor does is in `cell::sensor`. Several effects at one joint are in series from the motor outwards: drive train,
 //! clearance, backlash, lost motion, springs, bending. Only this module sees rapier, and only `convert` sees both kinds of vectors.

@@ -1,15 +1,43 @@
 //! A turn about a joint's origin: the moments about the x and y axes of its link bend it unequally.
 
+use std::num::NonZeroUsize;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::effects::Kind;
 use crate::effects::signature::library::{Hypothesis, Site};
-use crate::effects::signature::shape::{Displacement, Reading, Shape};
+use crate::effects::signature::shape::{Displacement, Family, Follows, Form, Reading, Recorded, Unnamed, from_one};
 
-pub(in crate::effects::signature) fn columns(reading: &Reading, joint: usize) -> Vec<Displacement> {
-    let moment = reading.posture.moment_across(joint);
-    reading.posture.across_link(joint).map(|axis| reading.turned(joint, axis * axis.dot(&moment))).to_vec()
+use super::Nameless;
+
+/// \[2\] A turn about a joint's origin: the moments about the x and y axes of its link bend it unequally.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct UnequalBend {
+    /// Joint, or the link that it moves.
+    #[serde(with = "from_one")]
+    #[schemars(with = "NonZeroUsize")]
+    pub joint: usize,
+}
+
+impl Follows for UnequalBend {
+    fn form(&self, _: bool) -> Form {
+        Form {
+            columns: 2,
+            of_magnitude: 2,
+            needs: Recorded::Pose,
+            unnamed: Some(Unnamed { family: Family::UnequalBend, contains: Some(Kind::LinkBending), near: None }),
+        }
+    }
+
+    fn columns(&self, reading: &Reading, _: bool) -> Vec<Displacement> {
+        let joint = self.joint;
+        let moment = reading.posture.moment_across(joint);
+        reading.posture.across_link(joint).map(|axis| reading.turned(joint, axis * axis.dot(&moment))).to_vec()
+    }
 }
 
 pub(super) fn hypotheses(site: &Site<'_>, joint: usize, all: &mut Vec<Hypothesis>) {
     let detail = format!("moment across the axis of joint {} turns its link, about one axis more than about another", joint + 1);
-    all.push(site.unnamed(Shape::UnequalBend { joint }, site.range(Kind::LinkBending), vec![1.0; 2], detail));
+    all.push(site.unnamed(Nameless::UnequalBend(UnequalBend { joint }), site.range(Kind::LinkBending), vec![1.0; 2], detail));
 }

@@ -1,7 +1,8 @@
 //! Cosine and sine of so many times a joint's angle turn it: twice the ratio of a strain-wave gear.
 
-use super::library::{Hypothesis, Site};
-use super::shape::Shape;
+use super::joint_eccentricity::Harmonic;
+use crate::effects::signature::library::{Hypothesis, Site};
+use crate::effects::signature::shape::Shape;
 use crate::effects::{Kind, Level, Location};
 
 /// Periods per turn (2 N) of the ratios N in which strain-wave gears are sold: 30, 50, 80, 100, 120, 160.
@@ -19,7 +20,7 @@ pub fn ripple(joint: usize, waves: u16, nameless: bool) -> Hypothesis {
     let wave = Hypothesis {
         kind: Some(Kind::StrainWaveError),
         location: Location { level: Level::Joint, index: Some(joint + 1) },
-        shape: Shape::Harmonic { joint, order: f64::from(waves) },
+        shape: Shape::Harmonic(Harmonic { joint, order: f64::from(waves) }),
         // The same at all joints.
         range: Kind::StrainWaveError.range(Some(joint), joint + 1),
         spread: vec![half; 2],
@@ -37,7 +38,7 @@ pub fn ripple(joint: usize, waves: u16, nameless: bool) -> Hypothesis {
     Hypothesis { detail: format!("{waves} periods per turn"), share: Some(share), ..wave }
 }
 
-pub(super) fn hypotheses(site: &Site<'_>, all: &mut Vec<Hypothesis>) {
+pub(in crate::effects) fn hypotheses(site: &Site<'_>, all: &mut Vec<Hypothesis>) {
     if let Some(joint) = site.place.filter(|_| site.turns()) {
         all.extend(WAVES_PER_TURN.map(|waves| ripple(joint, waves, false)));
     }
