@@ -38,12 +38,14 @@ pub mod settings;
 pub(crate) mod tests;
 mod unknown;
 mod verdict;
+// Asked by the laboratory alone.
+#[cfg(feature = "cli")]
 pub(crate) mod waterfall;
 mod weights;
 
 pub use evidence::Extension;
 pub use held_out::Block;
-pub use rows::DiagnosisError;
+pub use rows::{DiagnosisError, check_robot};
 
 use nalgebra::DVector;
 

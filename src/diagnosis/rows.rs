@@ -134,12 +134,7 @@ pub(crate) struct Readings<'a> {
 ///
 /// # Errors
 /// If not: with what would explain it. Measurements that tell too little are no error here.
-pub(crate) fn check_robot(
-    arm: &Arm,
-    sensor: &Sensor,
-    measurements: &[&Measurement],
-    settings: &Model,
-) -> Result<(), DiagnosisError> {
+pub fn check_robot(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], settings: &Model) -> Result<(), DiagnosisError> {
     let weights = vec![1.0; measurements.len()];
     match fit(arm, Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[] }, settings) {
         Ok(_) | Err(DiagnosisError::Geometry(_)) => Ok(()),
