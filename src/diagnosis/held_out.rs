@@ -16,6 +16,7 @@ use super::products::{Marginal, Products};
 use super::ripple::{self, Ripple};
 use super::search::climb;
 use super::settings::{self, Settings};
+use crate::effects::kind::joint_eccentricity::Harmonic;
 use crate::effects::signature::shape::Shape;
 use crate::measurement::Measurement;
 

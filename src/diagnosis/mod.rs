@@ -39,12 +39,14 @@ pub mod settings;
 pub(crate) mod tests;
 mod unknown;
 mod verdict;
+// Asked by the laboratory alone.
+#[cfg(feature = "cli")]
 pub(crate) mod waterfall;
 mod weights;
 
 pub use evidence::Extension;
 pub use held_out::Block;
-pub use rows::DiagnosisError;
+pub use rows::{DiagnosisError, check_robot};
 
 use nalgebra::DVector;
 
@@ -650,7 +652,8 @@ fn moved(linear: &Linear<'_>, evidence: &Evidence<'_>, members: &[(usize, usize)
     let hypothesis = |member: usize| &evidence.candidates.hypotheses[members[member].0];
     let mut unnamed: Vec<(usize, usize, f64)> = Vec::new();
     for first in (0..members.len()).filter(|member| hypothesis(*member).kind.is_none()) {
-        let beside = |member: &usize| hypothesis(*member).kind.is_none() && hypothesis(*member).location == hypothesis(first).location;
+        let beside =
+            |member: &usize| hypothesis(*member).kind.is_none() && hypothesis(*member).location == hypothesis(first).location;
         if (0..first).any(|member| beside(&member)) {
             continue;
         }

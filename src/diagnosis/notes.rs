@@ -110,5 +110,5 @@ fn is_on(step: Step, values: &[f64]) -> bool {
 /// How many folds do without something that evidence chose for them.
 fn doing_without(held_out: &HeldOut) -> Option<Note> {
     let count = held_out.folds.iter().filter(|fold| fold.used < fold.chosen.len()).count();
-    (count > 0).then(|| Note::FoldsDoWithout { by: held_out.by, count, folds: held_out.folds.len() })
+    (count > 0).then_some(Note::FoldsDoWithout { by: held_out.by, count, folds: held_out.folds.len() })
 }

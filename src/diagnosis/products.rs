@@ -443,11 +443,5 @@ pub(super) fn test_marginal(candidates: &Candidates, signatures: &DMatrix<f64>, 
         residual: residual.norm_squared(),
         equations: signatures.nrows() as f64,
     };
-    TestProducts(Products {
-        folds: vec![fold],
-        geometry: 0,
-        columns,
-        first_own,
-        rows: RwLock::default(),
-    })
+    TestProducts(Products { folds: vec![fold], geometry: 0, columns, first_own, rows: RwLock::default() })
 }

@@ -139,12 +139,7 @@ pub(crate) struct Readings<'a> {
 ///
 /// # Errors
 /// If not: with what would explain it. Measurements that tell too little are no error here.
-pub(crate) fn check_robot(
-    arm: &Arm,
-    sensor: &Sensor,
-    measurements: &[&Measurement],
-    settings: &Model,
-) -> Result<(), DiagnosisError> {
+pub fn check_robot(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], settings: &Model) -> Result<(), DiagnosisError> {
     match first_fit(arm, sensor, measurements, settings) {
         Ok(_) | Err(DiagnosisError::Geometry(_)) => Ok(()),
         Err(wrong) => Err(wrong),

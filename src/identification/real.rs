@@ -46,8 +46,12 @@ pub fn identify_real(
     if far.is_empty() {
         return identify_good(robot, aligned, sensor, measurements, Vec::new());
     }
-    let good: Vec<Measurement> =
-        measurements.iter().enumerate().filter(|(at, _)| !far.iter().any(|(row, _)| row == at)).map(|(_, row)| row.clone()).collect();
+    let good: Vec<Measurement> = measurements
+        .iter()
+        .enumerate()
+        .filter(|(at, _)| !far.iter().any(|(row, _)| row == at))
+        .map(|(_, row)| row.clone())
+        .collect();
     let said = |(row, off): &(usize, f64)| format!("{} ({:.1} mm)", measurements[*row].index + 1, off * 1e3);
     let mut list: Vec<String> = far.iter().take(FAR_SAID).map(said).collect();
     if far.len() > FAR_SAID {
