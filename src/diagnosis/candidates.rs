@@ -84,6 +84,8 @@ mod tests {
     use crate::diagnosis::tests::with_analysis;
     use crate::effects::signature::library::{Columns, library};
     use crate::effects::signature::shape::Shape;
+    use crate::effects::signature::unnamed::Nameless;
+    use crate::effects::signature::unnamed::nonlinear_torque::Softening;
     use crate::effects::{Level, Location};
 
     fn hypothesis(kind: Option<Kind>, joint: usize, share: Option<f64>, width: usize) -> Hypothesis {
@@ -91,7 +93,7 @@ mod tests {
             share,
             kind,
             location: Location { level: Level::Joint, index: Some(joint) },
-            shape: Shape::Softening { joint },
+            shape: Shape::Nameless(Nameless::Softening(Softening { joint })),
             range: [0.5, 2.0],
             spread: vec![1.0; width],
             detail: String::new(),
@@ -100,7 +102,7 @@ mod tests {
 
     #[test]
     fn columns_follow_each_other_and_a_unit_is_the_middle_of_the_range() {
-        let of = candidates([2, 1, 3].map(|width| hypothesis(None, 1, None, width)).to_vec());
+        let of = candidates([2, 1, 3].map(|width| hypothesis(None, 1, None, width)).to_vec(), Vec::new());
         assert_eq!((0..3).map(|number| of.columns(number)).collect::<Vec<_>>(), [0..2, 2..3, 3..6]);
         assert_eq!(of.unit, [1.0; 3]);
     }
@@ -109,18 +111,21 @@ mod tests {
     #[test]
     fn the_prior_is_shared_by_kinds_then_places_then_variants() {
         let (play, runout) = (Some(Kind::Backlash), Some(Kind::JointEccentricity));
-        let mut of = candidates(vec![
-            hypothesis(play, 1, None, 1),
-            hypothesis(play, 2, None, 1),
-            hypothesis(runout, 1, None, 1),
-            hypothesis(runout, 1, None, 1),
-            hypothesis(runout, 1, None, 1),
-            hypothesis(None, 2, None, 1),
-            hypothesis(Some(Kind::LinkBending), 1, Some(0.25), 1),
-            hypothesis(Some(Kind::LinkBending), 1, Some(0.75), 1),
-            // Nothing of it survives geometry: neither it nor its kind has a part.
-            hypothesis(Some(Kind::GearCoupling), 1, None, 1),
-        ]);
+        let mut of = candidates(
+            vec![
+                hypothesis(play, 1, None, 1),
+                hypothesis(play, 2, None, 1),
+                hypothesis(runout, 1, None, 1),
+                hypothesis(runout, 1, None, 1),
+                hypothesis(runout, 1, None, 1),
+                hypothesis(None, 2, None, 1),
+                hypothesis(Some(Kind::LinkBending), 1, Some(0.25), 1),
+                hypothesis(Some(Kind::LinkBending), 1, Some(0.75), 1),
+                // Nothing of it survives geometry: neither it nor its kind has a part.
+                hypothesis(Some(Kind::GearCoupling), 1, None, 1),
+            ],
+            Vec::new(),
+        );
         let prior = Prior { odds: 2.0, ..Settings::default().prior };
         // Twice the unit is the upper end: information of one there makes 4, just enough.
         let information = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.999];
@@ -138,7 +143,7 @@ mod tests {
     /// A ripple that a scan found has the part of one of all that were scanned, at one of all joints.
     #[test]
     fn what_a_scan_found_is_no_likelier_than_what_it_did_not_find() {
-        let mut of = candidates(vec![hypothesis(None, 4, Some(0.01), 1), hypothesis(None, 6, None, 1)]);
+        let mut of = candidates(vec![hypothesis(None, 4, Some(0.01), 1), hypothesis(None, 6, None, 1)], Vec::new());
         weigh(&mut of, &[1.0; 2], &Settings::default().prior);
         // Both are of one family; the arm has six joints or more.
         assert!((of.log_odds[0].exp() - 0.25 * 0.01 / 6.0).abs() < 1e-12);

@@ -34,7 +34,7 @@ mod tests {
                 // A reading every minute: the first reading after the step is the moment.
                 let mut steps = 0;
                 for (number, of) in analysis.evidence.candidates.hypotheses.iter().enumerate() {
-                    if let Shape::BaseStep { row } | Shape::ToolStep { row } = of.shape {
+                    if let Some(row) = of.shape.row() {
                         assert_eq!(place(&analysis, number).time_s, Some(60.0 * row as f64));
                         steps += 1;
                     }

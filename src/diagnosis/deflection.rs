@@ -176,7 +176,11 @@ mod tests {
                 let rows = analysis.linear.rows;
                 let width = 2e-3;
                 let location = Location { level: Level::Joint, index: Some(3) };
-                let play = [Present { location, shape: Shape::Direction { joint: 2 }, coefficients: vec![width] }];
+                let play = [Present {
+                    location,
+                    shape: Shape::Direction(crate::effects::kind::backlash::Direction { joint: 2 }),
+                    coefficients: vec![width],
+                }];
                 for reading in analysis.linear.readings {
                     let mut joints = reading.joints.clone();
                     joints[2] += 0.5 * width * reading.approach[2];
@@ -200,7 +204,7 @@ mod tests {
             |_, _, _, _, _| 0.0,
             |analysis| {
                 let rows = analysis.linear.rows;
-                let shape = Shape::Torque { joint: 1 };
+                let shape = Shape::Torque(crate::effects::kind::joint_compliance::Torque { joint: 1 });
                 let location = Location { level: Level::Joint, index: Some(2) };
                 let missed = |compliance: f64| -> f64 {
                     let yields = [Present { location, shape, coefficients: vec![compliance] }];

@@ -355,6 +355,8 @@ pub(super) fn log_allowed(z: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::diagnosis::products::test_marginal;
+    use crate::effects::kind::joint_compliance::Torque;
+    use crate::effects::signature::shape::Shape;
     use crate::effects::{Kind, Level, Location};
     use crate::seed::stream;
 
@@ -375,13 +377,19 @@ mod tests {
             share: None,
             kind: Some(Kind::JointCompliance),
             location: Location { level: Level::Joint, index: Some(1) },
-            shape: Shape::Torque { joint: 0 },
+            shape: Shape::Torque(Torque { joint: 0 }),
             range: [0.5, 2.0],
             spread: vec![1.0; 2],
             detail: String::new(),
         };
-        let candidates =
-            Candidates { hypotheses: vec![of], first: vec![0], unit: vec![1.0], log_odds: vec![-1.0], active: vec![true] };
+        let candidates = Candidates {
+            hypotheses: vec![of],
+            first: vec![0],
+            unit: vec![1.0],
+            log_odds: vec![-1.0],
+            active: vec![true],
+            scanned: 1,
+        };
         let (noise, settings) = (NoisePrior { degrees_of_freedom: 10.0, level: 1.0 }, Settings::default());
         let mut draws = stream(4, "test/one-signed");
         let signatures = DMatrix::from_fn(80, 2, |_, _| draws.normal());

@@ -115,7 +115,9 @@ mod tests {
         with_analysis(
             |_, _, _, _, _| 0.0,
             |analysis| {
-                let is = |of: &Shape| *of == Shape::Harmonic { joint: 2, order: 1.0 };
+                let is = |of: &Shape| {
+                    *of == Shape::Harmonic(crate::effects::kind::joint_eccentricity::Harmonic { joint: 2, order: 1.0 })
+                };
                 let of_kind = |number: &usize| {
                     let of = &analysis.evidence.candidates.hypotheses[*number];
                     of.kind == Some(Kind::JointEccentricity) && is(&of.shape)

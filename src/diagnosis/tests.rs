@@ -124,6 +124,7 @@ pub(crate) fn with_analysis(off: impl Fn(&Arm, &[f64], &[i8], usize, f64) -> f64
             strength: 0.0,
         },
         outliers: super::outliers::Outliers { probability: 0.0, share: 0.0, share_ci95: [0.0; 2], factor: 1.0, rows: Vec::new() },
+        left: 1.0,
         scatter: Vec::new(),
         orientation: 1.0,
         measurements: &rows,

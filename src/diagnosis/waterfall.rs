@@ -32,7 +32,6 @@ pub(crate) struct Waterfall<'a> {
     scheme: Scheme,
     weights: Vec<f64>,
     good: Vec<bool>,
-    settings: &'a Settings,
 }
 
 impl<'a> Waterfall<'a> {
@@ -52,20 +51,15 @@ impl<'a> Waterfall<'a> {
         let total = measurements.len();
         let groups = groups(measurements, &settings.noise);
         let start = vec![1.0; total];
-        let rows =
-            rows::fit(arm, Readings { sensor, measurements, weights: &start, displacement: &[], scatter: &[] }, &settings.model)?;
+        let rows = rows::fit(arm, Readings { sensor, measurements, weights: &start, displacement: &[], scatter: &[] })?;
         let (conditions, _) = conditions::conditions(measurements, &rows, &[], Loads::AsItStands, None, &settings.model);
         let scheme = held_out::schemes(measurements, &rows.targets, &groups, &settings.validation).swap_remove(0);
         let good = vec![true; total];
-        let mut waterfall = Waterfall { arm, sensor, measurements, rows, conditions, scheme, weights: start, good, settings };
+        let mut waterfall = Waterfall { arm, sensor, measurements, rows, conditions, scheme, weights: start, good };
         for _ in 0..PASSES {
             let displacement = waterfall.together(effects);
             let weights = &waterfall.weights;
-            let rows = rows::fit(
-                arm,
-                Readings { sensor, measurements, weights, displacement: &displacement, scatter: &[] },
-                &settings.model,
-            )?;
+            let rows = rows::fit(arm, Readings { sensor, measurements, weights, displacement: &displacement, scatter: &[] })?;
             let weighed = weights::weigh(&rows, &rows.residual, weights, &groups, &settings.noise);
             let outliers = outliers::look(&weighed.squares, &rows.equations.counts(), &settings.outliers).rows;
             waterfall.good = (0..total).map(|row| !outliers.contains(&row)).collect();
@@ -126,7 +120,6 @@ impl<'a> Waterfall<'a> {
                 let fitted = rows::fit(
                     self.arm,
                     Readings { sensor, measurements, weights: &weights, displacement: displacements, scatter: &[] },
-                    &self.settings.model,
                 )?;
                 let counted: Vec<usize> = (0..measurements.len()).filter(|row| held(row) && self.good[*row]).collect();
                 let square = |row: &usize| fitted.residual.rows_range(fitted.equations.of_position(*row)).norm_squared();

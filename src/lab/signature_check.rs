@@ -38,7 +38,6 @@ fn every_signature_is_what_physics_makes() {
     let fitted = fit(
         &scene.arm,
         Readings { sensor: &scene.sensor, measurements: &rows, weights: &vec![1.0; rows.len()], displacement: &[], scatter: &[] },
-        &Model::default(),
     )
     .unwrap();
     let known = conditions(&rows, &fitted, &[], Loads::AsItStands, None, &Model::default()).0;
