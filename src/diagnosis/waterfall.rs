@@ -45,7 +45,7 @@ impl<'a> Waterfall<'a> {
         sensor: &'a Sensor,
         measurements: &'a [&'a Measurement],
         effects: &[Effect],
-        settings: &'a Settings,
+        settings: &Settings,
     ) -> Result<Self, DiagnosisError> {
         settings.check()?;
         let total = measurements.len();
