@@ -179,6 +179,8 @@ pub enum Note {
     NoMasses,
     /// What the fit of the geometry says, in its own words.
     Geometry(String),
+    /// No fit settles around what was found.
+    Astray,
     /// The arm did not move between the repeats.
     UnmovedRepeats,
     /// Readings of a configuration are alike.

@@ -24,7 +24,7 @@ pub(super) fn confusion(analysis: &Analysis<'_>) -> Vec<Vec<Candidate>> {
                 })
                 .collect::<Vec<_>>()
         })
-        .filter(|set| set.len() > 1 && set.iter().map(|candidate| candidate.probability).sum::<f64>() >= decision.named)
+        .filter(|set| set.len() > 1 && set.iter().map(|candidate| candidate.probability).sum::<f64>() >= decision.there)
         .collect()
 }
 

@@ -128,20 +128,32 @@ impl<'a> Evidence<'a> {
 
     /// `members`: hypotheses, each with the standard deviation of its coefficients over the noise's.
     fn solve_sized(&self, members: impl Iterator<Item = (usize, f64)>) -> Option<Solved> {
+        let members: Vec<(usize, f64)> = members.collect();
         let (mut columns, mut precision) = (Vec::new(), Vec::new());
-        for (hypothesis, size) in members {
-            for column in self.candidates.columns(hypothesis) {
+        for (hypothesis, size) in &members {
+            for column in self.candidates.columns(*hypothesis) {
                 columns.push(column);
                 precision.push(1.0 / (size * size));
             }
         }
         let count = columns.len();
-        let mut products = DMatrix::zeros(count, count);
-        for (i, column) in columns.iter().enumerate() {
-            let row = self.marginal.row(*column);
-            for (j, other) in columns.iter().enumerate() {
-                products[(i, j)] = row[*other] + if i == j { precision[i] } else { 0.0 };
+        let mut products = DMatrix::from_diagonal(&DVector::from_vec(precision.clone()));
+        let mut first = 0;
+        for (number, (hypothesis, _)) in members.iter().enumerate() {
+            let width = self.candidates.columns(*hypothesis).len();
+            for (i, j) in (0..width).flat_map(|i| (0..width).map(move |j| (i, j))) {
+                products[(first + i, first + j)] += self.marginal.own(*hypothesis, i, j);
             }
+            // Of two members the first one's products are asked for: who is only tried stands last, and its own are never made.
+            if number + 1 < members.len() {
+                for i in first..first + width {
+                    let row = self.marginal.row(columns[i]);
+                    for j in first + width..count {
+                        (products[(i, j)], products[(j, i)]) = (row[columns[j]], row[columns[j]]);
+                    }
+                }
+            }
+            first += width;
         }
         let right = DVector::from_fn(count, |i, _| self.marginal.with_residual[columns[i]]);
         let cholesky = Cholesky::new(products)?;

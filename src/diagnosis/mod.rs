@@ -160,6 +160,8 @@ struct State {
     loads: Loads,
     /// Joints that stand upright, as the first pass found: members and coefficients are numbers in the library, which hangs on them.
     upright: Option<Vec<bool>>,
+    /// Whether what was found about it could not be taken as it is.
+    astray: bool,
 }
 
 impl State {
@@ -179,6 +181,7 @@ impl State {
             scale: 1.0,
             loads: Loads::AsItStands,
             upright: None,
+            astray: false,
         }
     }
 
@@ -209,6 +212,30 @@ impl State {
         }
     }
 
+    /// With half of the effects of this one and half of those of `other`.
+    fn halfway(&self, other: &State) -> State {
+        let half =
+            |of: &State| -> Vec<(usize, f64)> { of.coefficients.iter().map(|(column, value)| (*column, 0.5 * value)).collect() };
+        let half_present = |of: &State| -> Vec<Present> {
+            let halved = |one: &Present| Present {
+                coefficients: one.coefficients.iter().map(|value| 0.5 * value).collect(),
+                ..one.clone()
+            };
+            of.present.iter().map(halved).collect()
+        };
+        let of = |state: &State, row: usize| state.displacement.get(row).copied().unwrap_or_default();
+        let middle = |row: usize| -> Displacement {
+            let (a, b) = (of(self, row), of(other, row));
+            std::array::from_fn(|axis| 0.5 * (a[axis] + b[axis]))
+        };
+        State {
+            displacement: (0..self.far.len()).map(middle).collect(),
+            coefficients: [half(self), half(other)].concat(),
+            present: [half_present(self), half_present(other)].concat(),
+            ..other.clone()
+        }
+    }
+
     /// Whether `pass` found what it was made around. `sigma_m`: noise of a position about an axis.
     fn is_settled(&self, pass: &Pass, sigma_m: f64, settings: &settings::Model) -> bool {
         let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < settings.settled_weight);
@@ -225,6 +252,39 @@ impl State {
             && pass.loads == self.loads
             && pass.changed_m < settings.settled * sigma_m
     }
+}
+
+/// A pass that went well, to go back to.
+struct Before {
+    number: usize,
+    /// What it was made around.
+    state: State,
+    /// [`Pass::typical_m`].
+    typical_m: f64,
+    /// How often the way from it has been halved.
+    halvings: usize,
+}
+
+/// The linear problem about `state`. The effects found so far are taken out as large as they are (`displaced`) on the arm as it is
+/// fitted now (`rows`), and put back along their signatures.
+fn around<'a>(
+    state: &State,
+    rows: &'a Rows,
+    conditions: &'a Conditions,
+    displaced: &[Displacement],
+    candidates: &'a Candidates,
+) -> Linear<'a> {
+    let mut total = rows.residual.clone();
+    for (row, now) in displaced.iter().enumerate() {
+        let before = state.displacement.get(row).copied().unwrap_or_default();
+        let less: Displacement = std::array::from_fn(|axis| before[axis] - now[axis]);
+        for (equation, value) in rows.equations.of(row).zip(rows.read(row, &less)) {
+            total[equation] += value;
+        }
+    }
+    let linear = Linear::new(rows, &conditions.readings, candidates, total, state.scale);
+    let total = &linear.residual + linear.made(&state.coefficients);
+    Linear { residual: total, ..linear }
 }
 
 /// One round: everything about the arm as it is with the effects found so far.
@@ -278,18 +338,7 @@ impl Pass {
             conditions::conditions(measurements, &rows, &state.present, state.loads, state.upright.as_deref(), &settings.model);
         let mut candidates = data.options.candidates(&rows, &conditions, &state.ripples);
         let scheme = held_out::schemes(measurements, &rows.targets, &data.groups, &settings.validation).swap_remove(0);
-        // The effects found so far are taken out as large as they are on the arm as it is fitted now, and put back along their signatures.
-        let mut total = rows.residual.clone();
-        for (row, now) in displaced.iter().enumerate() {
-            let before = state.displacement.get(row).copied().unwrap_or_default();
-            let less: Displacement = std::array::from_fn(|axis| before[axis] - now[axis]);
-            for (equation, value) in rows.equations.of(row).zip(rows.read(row, &less)) {
-                total[equation] += value;
-            }
-        }
-        let linear = Linear::new(&rows, &conditions.readings, &candidates, total, state.scale);
-        let total = &linear.residual + linear.made(&state.coefficients);
-        let linear = Linear { residual: total, ..linear };
+        let linear = around(state, &rows, &conditions, &displaced, &candidates);
         let products = linear.products(&scheme.fold, scheme.folds);
         let Linear { residual: total, prior, .. } = linear;
         let marginal = Marginal::new(&products, None, &prior).ok_or(GeometryError::Degenerate)?;
@@ -362,6 +411,39 @@ impl Pass {
         })
     }
 
+    /// What geometry leaves of the positions beside the effects that the pass was made around, as large as they are: median over the
+    /// readings, m.
+    fn typical_m(&self) -> f64 {
+        let rows = &self.rows;
+        let of = |row: usize| rows.residual.rows_range(rows.equations.of_position(row)).norm();
+        let mut left: Vec<f64> = (0..rows.equations.readings()).map(of).collect();
+        left.sort_by(f64::total_cmp);
+        left.get(left.len() / 2).copied().unwrap_or(0.0)
+    }
+
+    /// Logarithm of the likelihood of the readings with the same set, if loads acted as in `state`, which is else what the pass was made
+    /// around. `None` where the rows do not tell where the arm stands.
+    fn log_likelihood_around(&self, data: &Data<'_>, state: &State) -> Option<f64> {
+        let settings = &data.options.settings;
+        let (conditions, displaced) = conditions::conditions(
+            data.measurements,
+            &self.rows,
+            &state.present,
+            state.loads,
+            state.upright.as_deref(),
+            &settings.model,
+        );
+        let linear = around(state, &self.rows, &conditions, &displaced, &self.candidates);
+        // Nothing but the members: thousands of signatures for one number would double the memory of a diagnosis.
+        let hypotheses = self.members.iter().map(|(hypothesis, _)| self.candidates.hypotheses[*hypothesis].clone()).collect();
+        let members: Vec<(usize, usize)> = self.members.iter().enumerate().map(|(at, (_, scale))| (at, *scale)).collect();
+        let own = candidates(hypotheses, Vec::new());
+        let linear = Linear { candidates: &own, prior: linear.prior.scaled(self.scale), ..linear };
+        let products = linear.products(&vec![0; data.measurements.len()], 1);
+        let marginal = Marginal::new(&products, None, &linear.prior)?;
+        Some(Evidence { marginal: &marginal, candidates: &own, noise: data.noise, settings }.log_likelihood(&members))
+    }
+
     fn linear(&self) -> Linear<'_> {
         Linear::new(&self.rows, &self.conditions.readings, &self.candidates, self.total.clone(), self.scale)
     }
@@ -391,6 +473,8 @@ pub(crate) struct Analysis<'a> {
     pub(crate) repeats: Option<Repeats>,
     /// Correlation of residuals of the same configuration, where there are any.
     pub(crate) correlation: Option<f64>,
+    /// Whether the fit around what was found went astray.
+    pub(crate) astray: bool,
     pub(crate) options: &'a Options,
 }
 
@@ -462,6 +546,7 @@ pub fn diagnose(
         measurements,
         sensor: &Sensor { orientation_sigma_rad, ..sensor.clone() },
         repeats: data.repeats,
+        astray: state.astray,
         correlation: (data.groups.rows.len() < measurements.len()).then_some(pass.weighed.correlation),
         options,
     };
@@ -478,13 +563,33 @@ fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
     let (mut last, mut looks) = (settings.model.passes - 1, 0);
     // Without any scatter: held-out errors, and the state to go back to.
     let mut plain: Option<(f64, State)> = None;
+    let mut before: Option<Before> = None;
     for number in 0.. {
-        let mut pass = Pass::new(data, &state, number)?;
+        let pass = match (Pass::new(data, &state, number), before.take()) {
+            (Ok(pass), Some(last)) if pass.typical_m() > settings.model.grows * last.typical_m => Err(last),
+            (Err(DiagnosisError::Geometry(GeometryError::Degenerate)), Some(last)) => Err(last),
+            (pass, _) => Ok(pass?),
+        };
+        let mut pass = match pass {
+            Ok(pass) => pass,
+            // What was found is too large to be taken as first order has it: half the way, or where that does not help, none.
+            Err(last) if last.halvings < settings.model.halvings => {
+                state = last.state.halfway(&state);
+                before = Some(Before { halvings: last.halvings + 1, ..last });
+                continue;
+            }
+            Err(last) => {
+                let pass = Pass::new(data, &last.state, last.number)?;
+                return Ok((State { astray: true, ..last.state }, pass));
+            }
+        };
+        before = Some(Before { number, state: state.clone(), typical_m: pass.typical_m(), halvings: 0 });
         if number < settings.model.loads_passes && pass.loads_matter_m > settings.model.loads_matter * sigma_m {
             let other = State { loads: state.loads.other(), ..state.clone() };
-            let otherwise = Pass::new(data, &other, number)?;
-            if otherwise.log_likelihood > pass.log_likelihood {
-                (state, pass) = (other, otherwise);
+            if pass.log_likelihood_around(data, &other).is_some_and(|otherwise| otherwise > pass.log_likelihood) {
+                state = other;
+                drop(pass);
+                pass = Pass::new(data, &state, number)?;
             }
         }
         let linear = pass.linear();

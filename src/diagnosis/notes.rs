@@ -13,6 +13,9 @@ pub(super) fn notes(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFloo
     let decision = &analysis.options.settings.decision;
     let mut notes = analysis.conditions.notes.clone();
     notes.extend(analysis.linear.rows.notes.iter().cloned().map(Note::Geometry));
+    if analysis.astray {
+        notes.push(Note::Astray);
+    }
     if analysis.repeats.is_some_and(|repeats| !repeats.moved) {
         notes.push(Note::UnmovedRepeats);
     }

@@ -29,8 +29,11 @@ pub(crate) struct Products {
 /// The rows of one fold.
 #[derive(Debug)]
 struct Fold {
-    /// Whitened signatures.
-    signatures: DMatrix<f64>,
+    /// Whitened signatures, column by column. They are by far the largest thing that a diagnosis holds, and as single precision they
+    /// are half of it: a rounding of 6e-8 of a signature is far below the noise of any sensor.
+    signatures: Vec<f32>,
+    /// Rows of `signatures`.
+    height: usize,
     /// Of the geometry.
     normal: DMatrix<f64>,
     /// Of the geometry with signatures and, last, the residual.
@@ -43,37 +46,39 @@ struct Fold {
 }
 
 /// Sum of products, in an order that does not depend on the processor.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+fn dot<A: Copy + Into<f64>, B: Copy + Into<f64>>(a: &[A], b: &[B]) -> f64 {
+    let product = |a: A, b: B| -> f64 { a.into() * b.into() };
     let mut sums = [0.0; 8];
     let (blocks_a, blocks_b) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = blocks_a.remainder().iter().zip(blocks_b.remainder()).map(|(a, b)| a * b).sum();
+    let rest: f64 = blocks_a.remainder().iter().zip(blocks_b.remainder()).map(|(a, b)| product(*a, *b)).sum();
     for (a, b) in blocks_a.zip(blocks_b) {
         for lane in 0..8 {
-            sums[lane] += a[lane] * b[lane];
+            sums[lane] += product(a[lane], b[lane]);
         }
     }
     ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7])) + rest
 }
 
-/// Sums of products of `own` with every column of `matrix`, added to `sums`: four columns at a time, as `own` is read once for all of them.
-fn add_dots(own: &[f64], matrix: &DMatrix<f64>, sums: &mut [f64]) {
-    let part = |number: usize| column(matrix, number);
+/// Sums of products of `own` with every column of `signatures`, added to `sums`: four columns at a time, as `own` is read once for all
+/// of them.
+fn add_dots(own: &[f64], signatures: &[f32], sums: &mut [f64]) {
+    let height = own.len();
+    let part = |number: usize| &signatures[number * height..(number + 1) * height];
     let mut blocks = sums.chunks_exact_mut(4);
     let mut number = 0;
     for block in &mut blocks {
         let columns = [part(number), part(number + 1), part(number + 2), part(number + 3)];
         let mut lanes = [[0.0; 4]; 4];
-        let whole = own.len() / 4 * 4;
+        let whole = height / 4 * 4;
         for at in (0..whole).step_by(4) {
             for (lanes, column) in lanes.iter_mut().zip(columns) {
                 for lane in 0..4 {
-                    lanes[lane] += own[at + lane] * column[at + lane];
+                    lanes[lane] += own[at + lane] * f64::from(column[at + lane]);
                 }
             }
         }
         for ((sum, lanes), column) in block.iter_mut().zip(lanes).zip(columns) {
-            let rest: f64 = own[whole..].iter().zip(&column[whole..]).map(|(a, b)| a * b).sum();
-            *sum += (lanes[0] + lanes[2]) + (lanes[1] + lanes[3]) + rest;
+            *sum += (lanes[0] + lanes[2]) + (lanes[1] + lanes[3]) + dot(&own[whole..], &column[whole..]);
         }
         number += 4;
     }
@@ -144,7 +149,7 @@ impl Products {
         let width = self.width();
         let mut row = vec![0.0; width * self.folds.len()];
         for (fold, sums) in self.folds.iter().zip(row.chunks_exact_mut(width.max(1))) {
-            add_dots(column(&fold.signatures, number), &fold.signatures, sums);
+            fold.add_products(number, sums);
         }
         let row = Arc::new(row);
         if let Ok(mut known) = self.rows.write() {
@@ -155,6 +160,17 @@ impl Products {
 }
 
 impl Fold {
+    /// Column `number` of the signatures.
+    fn signature(&self, number: usize) -> &[f32] {
+        &self.signatures[number * self.height..(number + 1) * self.height]
+    }
+
+    /// Products of column `number` with every column, added to `sums`.
+    fn add_products(&self, number: usize, sums: &mut [f64]) {
+        let own: Vec<f64> = self.signature(number).iter().map(|value| f64::from(*value)).collect();
+        add_dots(&own, &self.signatures, sums);
+    }
+
     fn new(
         rows: &Rows,
         readings: &[Reading],
@@ -168,8 +184,9 @@ impl Fold {
         let (geometry, width) = (rows.jacobian.ncols(), columns.last().map_or(0, |last| last.end));
         let equations = own_rows.iter().map(|row| rows.equations.of(*row).len()).sum();
         let mut jacobian = DMatrix::zeros(equations, geometry);
-        let mut signatures = DMatrix::zeros(equations, width);
+        let mut signatures = vec![0.0_f32; equations * width];
         let mut left = vec![0.0; equations];
+        let root = libm::sqrt(count);
         let mut to = 0;
         for row in own_rows {
             let (from, number) = (rows.equations.of(*row).start, rows.equations.of(*row).len());
@@ -177,7 +194,7 @@ impl Fold {
             for parameter in 0..geometry {
                 values.iter_mut().enumerate().for_each(|(i, value)| *value = rows.jacobian[(from + i, parameter)]);
                 rows.whitening.apply(*row, &mut values);
-                values.iter().enumerate().for_each(|(i, value)| jacobian[(to + i, parameter)] = *value);
+                values.iter().enumerate().for_each(|(i, value)| jacobian[(to + i, parameter)] = value * root);
             }
             for (hypothesis, of) in candidates.hypotheses.iter().enumerate() {
                 let unit = candidates.unit[hypothesis];
@@ -186,35 +203,39 @@ impl Fold {
                     values.iter_mut().zip(rows.read(*row, moved)).for_each(|(value, moved)| *value = moved * factor);
                     rows.whitening.apply(*row, &mut values);
                     let number = columns[hypothesis].start + i;
-                    values.iter().enumerate().for_each(|(i, value)| signatures[(to + i, number)] = *value);
+                    let from = number * equations + to;
+                    values.iter().enumerate().for_each(|(i, value)| signatures[from + i] = (value * root) as f32);
                 }
             }
             values.iter_mut().enumerate().for_each(|(i, value)| *value = residual[from + i]);
             rows.whitening.apply(*row, &mut values);
-            left[to..to + number].copy_from_slice(&values);
+            values.iter().enumerate().for_each(|(i, value)| left[to + i] = value * root);
             to += number;
         }
-        if count != 1.0 {
-            let root = libm::sqrt(count);
-            jacobian *= root;
-            signatures *= root;
-            left.iter_mut().for_each(|value| *value *= root);
-        }
+        let signature = |number: usize| &signatures[number * equations..(number + 1) * equations];
         let normal = gram(&jacobian);
         let mixed = DMatrix::from_fn(geometry, width + 1, |parameter, other| {
-            let with = if other < width { column(&signatures, other) } else { left.as_slice() };
-            dot(column(&jacobian, parameter), with)
+            let of_parameter = column(&jacobian, parameter);
+            if other < width { dot(of_parameter, signature(other)) } else { dot(of_parameter, &left) }
         });
         let own = columns
             .iter()
             .flat_map(|of| of.clone().flat_map(move |a| of.clone().map(move |b| (a, b))))
-            .map(|(a, b)| dot(column(&signatures, a), column(&signatures, b)))
+            .map(|(a, b)| dot(signature(a), signature(b)))
             .collect();
-        let with_residual = (0..width).map(|number| dot(column(&signatures, number), &left)).collect();
+        let with_residual = (0..width).map(|number| dot(signature(number), &left)).collect();
         // A row that counts half is half an equation.
         let weight = |row: &usize| count * rows.equations.of(*row).len() as f64 * rows.whitening.weights()[*row];
-        let equations = own_rows.iter().map(weight).sum();
-        Fold { residual: dot(&left, &left), signatures, normal, mixed, own, with_residual, equations }
+        Fold {
+            residual: dot(&left, &left),
+            equations: own_rows.iter().map(weight).sum(),
+            height: equations,
+            signatures,
+            normal,
+            mixed,
+            own,
+            with_residual,
+        }
     }
 }
 
@@ -345,7 +366,7 @@ impl<'a> Marginal<'a> {
         } else {
             // Of many columns, which no fold asks for.
             for fold in &self.products.folds {
-                add_dots(column(&fold.signatures, number), &fold.signatures, &mut row);
+                fold.add_products(number, &mut row);
             }
         }
         let mixed = column(&self.mixed, number);
@@ -424,6 +445,7 @@ impl TestProducts {
 #[cfg(test)]
 pub(super) fn test_marginal(candidates: &Candidates, signatures: &DMatrix<f64>, residual: &DVector<f64>) -> TestProducts {
     let columns: Vec<Range<usize>> = (0..candidates.hypotheses.len()).map(|number| candidates.columns(number)).collect();
+    let signatures = &signatures.map(|value| f64::from(value as f32));
     let (mut first_own, mut own) = (Vec::new(), Vec::new());
     for of in &columns {
         first_own.push(own.len());
@@ -435,7 +457,8 @@ pub(super) fn test_marginal(candidates: &Candidates, signatures: &DMatrix<f64>, 
     }
     let width = signatures.ncols();
     let fold = Fold {
-        signatures: signatures.clone(),
+        signatures: signatures.iter().map(|value| *value as f32).collect(),
+        height: signatures.nrows(),
         normal: DMatrix::zeros(0, 0),
         mixed: DMatrix::zeros(0, width + 1),
         own,

@@ -24,6 +24,37 @@ pub(super) struct Ripple {
     pub(super) drop: f64,
 }
 
+/// Cosine and sine of whole multiples of angles, one multiple after the other: each is the last one turned by the angle itself.
+struct Turning {
+    /// Cosine and sine of each angle.
+    step: Vec<(f64, f64)>,
+    /// Of the next multiple.
+    next: Vec<(f64, f64)>,
+}
+
+impl Turning {
+    /// From multiple `first` on.
+    fn new(angles: impl Iterator<Item = f64> + Clone, first: u16) -> Turning {
+        let of = |factor: f64| {
+            let cosine_sine = |angle: f64| {
+                let (sine, cosine) = libm::sincos(factor * angle);
+                (cosine, sine)
+            };
+            angles.clone().map(cosine_sine).collect()
+        };
+        Turning { step: of(1.0), next: of(f64::from(first)) }
+    }
+
+    /// Puts cosine and sine of the next multiple of each angle into the columns of `wave`.
+    fn next(&mut self, wave: &mut DMatrix<f64>) {
+        let (cosines, sines) = wave.as_mut_slice().split_at_mut(self.step.len());
+        for (((now, (c, s)), cosine), sine) in self.next.iter_mut().zip(&self.step).zip(cosines).zip(sines) {
+            (*cosine, *sine) = *now;
+            *now = (now.0 * c - now.1 * s, now.0 * s + now.1 * c);
+        }
+    }
+}
+
 /// The strongest ripple of each joint in `residual` (m, rad), whose noise has the mean square `level` in declared sigmas; the strongest
 /// first, none that is weak or a candidate in play already. `counts`: rows that are looked at.
 pub(super) fn scan(
@@ -67,12 +98,10 @@ pub(super) fn scan(
                 }
             }
             let absorbed = lower.solve_lower_triangular(&mixed)?;
-            let drop = |waves: u16| -> f64 {
-                let mut wave = DMatrix::zeros(readings.len(), 2);
-                for (row, reading) in readings.iter().enumerate() {
-                    let (sine, cosine) = libm::sincos(f64::from(waves) * reading.joints[joint]);
-                    (wave[(row, 0)], wave[(row, 1)]) = (cosine, sine);
-                }
+            let mut turning = Turning::new(readings.iter().map(|reading| reading.joints[joint]), *RIPPLES.start());
+            let mut wave = DMatrix::zeros(readings.len(), 2);
+            let mut drop = || -> f64 {
+                turning.next(&mut wave);
                 let taken = &absorbed * &wave;
                 let product = |a: usize, b: usize| -> f64 {
                     let all: f64 = (0..readings.len()).map(|row| wave[(row, a)] * wave[(row, b)] * own[row]).sum();
@@ -88,7 +117,7 @@ pub(super) fn scan(
                 (bb * right[0] * right[0] - 2.0 * ab * right[0] * right[1] + aa * right[1] * right[1]) / determinant / level
             };
             RIPPLES
-                .map(|waves| Ripple { joint, waves, drop: drop(waves) })
+                .map(|waves| Ripple { joint, waves, drop: drop() })
                 .filter(|one| one.drop >= settings.worth)
                 .max_by(|a, b| a.drop.total_cmp(&b.drop).then(b.waves.cmp(&a.waves)))
         })

@@ -184,6 +184,11 @@ settings! {
         settled: f64 = 0.1 => 0.0..=MANY,
         /// Change of a row's weight from pass to pass that is nothing.
         settled_weight: f64 = 1e-2 => 0.0..=1.0,
+        /// What is typically left of the positions may grow by so much from pass to pass: more, and effects were taken larger than first
+        /// order tells.
+        grows: f64 = 2.0 => 1.0..=MANY,
+        /// How often the way to what was found is halved then.
+        halvings: usize = 3 => 0.0..=100.0,
         /// A joint is upright where its torque never exceeds so many sigmas of what is not known of it: its axis leans by less than a degree,
         /// and which way its foot leans decides on which side its play is seated.
         upright: f64 = 6.0 => 0.0..=MANY,
@@ -312,8 +317,11 @@ settings! {
 
     /// What is said.
     Decision {
-        /// From this probability on something is named.
-        named: f64 = 0.5 => SHARE,
+        /// From this probability on something is named: a wrong name, after which someone mends what is not broken, costs twice what a
+        /// missing one does.
+        named: f64 = 2.0 / 3.0 => SHARE,
+        /// From this probability on something is there, whatever it is called.
+        there: f64 = 0.5 => SHARE,
         /// From this probability on nothing else needs to be considered.
         sure: f64 = 0.95 => SHARE,
         /// Share of the folds that must choose a cause for it to be settled.

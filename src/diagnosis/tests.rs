@@ -131,6 +131,7 @@ pub(crate) fn with_analysis(off: impl Fn(&Arm, &[f64], &[i8], usize, f64) -> f64
         sensor: &sensor,
         repeats: None,
         correlation: None,
+        astray: false,
         options: &options,
     });
 }

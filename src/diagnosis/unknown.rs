@@ -23,7 +23,7 @@ pub(super) fn unknown(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFl
     let usual = over * over;
     let excess = known && (level > decision.excess * usual || analysis.left > analysis.options.settings.noise.no_noise * usual);
     let scatters = !analysis.scatter.is_empty();
-    let present = of_nameless >= decision.named || structured || excess || scatters;
+    let present = of_nameless >= decision.there || structured || excess || scatters;
     let mut remains: Vec<Remains> = Vec::new();
     if present {
         let detail = |member: usize| &analysis.evidence.candidates.hypotheses[analysis.found.best[member].0].detail;

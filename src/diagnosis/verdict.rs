@@ -68,7 +68,7 @@ fn decide(unknown: bool, effects: &[Effect], sets: &[Vec<Candidate>], share: f64
         effect.probability >= settings.sure && effect.folds[0] as f64 >= settings.folds * effect.folds[1] as f64
     };
     let named: Vec<&Effect> = effects.iter().filter(|effect| effect.kind != Kind::MeasurementOutliers).collect();
-    let open = sets.iter().any(|set| set.iter().map(|candidate| candidate.probability).sum::<f64>() >= settings.named);
+    let open = sets.iter().any(|set| set.iter().map(|candidate| candidate.probability).sum::<f64>() >= settings.there);
     if unknown {
         Verdict::UnknownRemains
     } else if !named.is_empty() && named.iter().all(settled) {

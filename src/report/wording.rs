@@ -223,6 +223,11 @@ fn note(note: Note) -> String {
                 .to_owned()
         }
         Note::Geometry(said) => said,
+        Note::Astray => {
+            "no fit settles around what was found, so large is what several shapes together do where they nearly cancel: magnitudes hold to \
+             first order only; a larger declared noise leaves less to be explained"
+                .to_owned()
+        }
         Note::UnmovedRepeats => {
             "the repeats were read without a move between them: they show the sensor's noise, not what the arm repeats to".to_owned()
         }
@@ -274,7 +279,11 @@ fn note(note: Note) -> String {
         Note::UnusualNoise { ratio, source, beside } => {
             let scatter =
                 if beside.is_empty() { String::new() } else { format!(" (beside the scatter of joint {})", numbers(&beside, " and ")) };
-            let large = if ratio < 1.0 { ": it is said to be larger than it is, and hides what is there" } else { "" };
+            let large = if ratio < 1.0 {
+                ": it is said to be larger than it is, and hides what is there"
+            } else {
+                ": something remains, or the sensor is worse than is said, and what is made of its noise may have been given a name"
+            };
             format!("the residuals are {ratio:.2} times the {} noise{scatter}{large}", whose(source))
         }
     }

@@ -12,7 +12,7 @@ use crate::effects::signature::shape::{
 };
 use crate::effects::{Kind, Parameters, Values};
 
-use super::radial_clearance::HELD;
+use super::radial_clearance::{HELD, is_near};
 
 /// \[1\] A turn along the moment across a joint's axis. Friction of the fit holds what carries less than the share `held` of the
 /// force times the length of the arm outboard.
@@ -43,8 +43,8 @@ impl Named for MomentAcrossSign {
     fn undecided(&self, reading: &Reading) -> bool {
         let joint = self.joint;
         let posture = &reading.posture;
-        let reach = posture.forces[joint].norm() * posture.reaches[joint];
-        little(posture.moment_across(joint).norm(), posture.moment_sigma(joint), reach)
+        let (load, all) = (posture.moment_across(joint).norm(), posture.forces[joint].norm() * posture.reaches[joint]);
+        little(load, posture.moment_sigma(joint), all) || is_near(self.held, load / all)
     }
 
     fn parameters(&self, _: Coefficients<'_>) -> Parameters {
