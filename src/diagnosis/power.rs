@@ -608,7 +608,7 @@ mod tests {
                             }
                         }
                     }
-                    right += usize::from(own >= 0.5 * all && best.1);
+                    right += usize::from(own >= settings.decision.named * all && best.1);
                 }
                 let share = f64::from(right as u32) / f64::from(cases as u32);
                 // Three standard errors of the count, and as much again for that of the draws.

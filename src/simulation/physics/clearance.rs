@@ -31,7 +31,7 @@ impl Clearance {
         *self == Clearance::NONE
     }
 
-    pub(super) fn check(&self, joint: usize) -> Result<(), PhysicsError> {
+    pub(in crate::simulation) fn check(&self, joint: usize) -> Result<(), PhysicsError> {
         let fields = [
             ("radial", self.radial_m, LARGEST_LENGTH_M, "m"),
             ("axial", self.axial_m, LARGEST_LENGTH_M, "m"),

@@ -2,15 +2,15 @@
 
 /// A coordinate outboard of the joint's motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Coordinate {
-    pub(super) joint: usize,
-    pub(super) direction: Direction,
-    pub(super) law: Law,
+pub(in crate::simulation) struct Coordinate {
+    pub(in crate::simulation) joint: usize,
+    pub(in crate::simulation) direction: Direction,
+    pub(in crate::simulation) law: Law,
 }
 
 /// Which motion it is, in the frame after the joint's motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Direction {
+pub(in crate::simulation) enum Direction {
     /// About the joint's axis (along it where the joint slides).
     Joint,
     /// About the x axis of the link, across the joint's: with y a Cardan joint. How it shares a large bend between its axes is of
@@ -25,11 +25,11 @@ pub(super) enum Direction {
 }
 
 /// Where a beam is hinged, as shares of its length: the points of Gauss's rule, 1/2 ∓ 1/(2 √3).
-pub(super) const BEAM_POINTS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
+pub(in crate::simulation) const BEAM_POINTS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 /// What holds it. Units per rad, or per m where the joint slides.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Law {
+pub(in crate::simulation) enum Law {
     /// A linear spring, N·m/rad.
     Spring { stiffness: f64 },
     /// The same, and a servo that adds the sag which it expects from the load that it knows of.
@@ -46,7 +46,7 @@ pub(super) enum Law {
 
 impl Law {
     /// Name in results: that of the effect.
-    pub(super) fn name(self, direction: Direction) -> &'static str {
+    pub(in crate::simulation) fn name(self, direction: Direction) -> &'static str {
         match (self, direction) {
             (Law::Spring { .. }, Direction::Joint) => "joint_compliance",
             (Law::Spring { .. }, _) => "link_bending",
@@ -61,7 +61,7 @@ impl Law {
 
 /// What acts on a coordinate during a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Hold {
+pub(in crate::simulation) enum Hold {
     /// Stiffness and the coordinate at which it is relaxed.
     Spring { stiffness: f64, rest: f64 },
     /// Between two limits.
@@ -69,14 +69,14 @@ pub(super) enum Hold {
 }
 
 /// The spring that hardens, as its tangent at `at`: steps then converge as Newton's do.
-pub(super) fn tangent(stiffness: f64, cubic: f64, at: f64) -> Hold {
+pub(in crate::simulation) fn tangent(stiffness: f64, cubic: f64, at: f64) -> Hold {
     let slope = stiffness + 3.0 * cubic * at * at;
     Hold::Spring { stiffness: slope, rest: at - at * (stiffness + cubic * at * at) / slope }
 }
 
 /// Spring and damper after `dwell_s` at constant load, from `start`: the exact solution `rest + (start − rest) e^(−t/T)`, in which
 /// `rest` is compliance times load, is that of a stiffer spring with another resting place.
-pub(super) fn crept(compliance: f64, time_constant: f64, start: f64, dwell_s: f64) -> Hold {
+pub(in crate::simulation) fn crept(compliance: f64, time_constant: f64, start: f64, dwell_s: f64) -> Hold {
     let kept = libm::exp(-dwell_s / time_constant);
     // Before anything has crept the coordinate is as good as locked.
     let yielded = (1.0 - kept).max(1e-9);

@@ -8,22 +8,22 @@ use super::conditions::Conditions;
 
 /// The drive train of one joint.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Drive {
-    pub(super) encoders: Vec<Encoder>,
-    pub(super) wave_generators: Vec<WaveGenerator>,
+pub(in crate::simulation) struct Drive {
+    pub(in crate::simulation) encoders: Vec<Encoder>,
+    pub(in crate::simulation) wave_generators: Vec<WaveGenerator>,
     /// Of the joint's own angle, rad/rad.
-    pub(super) ratio_error: f64,
+    pub(in crate::simulation) ratio_error: f64,
     /// Joints whose motion leaks, and how much of it.
-    pub(super) leaks: Vec<(usize, f64)>,
-    pub(super) worn: Vec<WornSector>,
-    pub(super) memories: Vec<Memory>,
+    pub(in crate::simulation) leaks: Vec<(usize, f64)>,
+    pub(in crate::simulation) worn: Vec<WornSector>,
+    pub(in crate::simulation) memories: Vec<Memory>,
     /// Drift of the zero with the temperature of the link that the joint moves, rad/K.
-    pub(super) zero_drift: f64,
+    pub(in crate::simulation) zero_drift: f64,
 }
 
 /// An encoder whose disc is badly fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Encoder {
+pub(in crate::simulation) enum Encoder {
     /// The disc's centre is off the axis.
     OffAxis {
         /// Distance over the radius of the graduation.
@@ -43,7 +43,7 @@ pub(super) enum Encoder {
 
 impl Encoder {
     /// The encoder that reads wrongly by `amplitude · cos(order · q + phase)`, to first order in the amplitude.
-    pub(super) fn new(amplitude: f64, order: u8, phase: f64) -> Self {
+    pub(in crate::simulation) fn new(amplitude: f64, order: u8, phase: f64) -> Self {
         use std::f64::consts::{FRAC_PI_2, PI};
         let phase = if amplitude < 0.0 { phase + PI } else { phase };
         let amplitude = amplitude.abs();
@@ -55,7 +55,7 @@ impl Encoder {
     }
 
     /// What the shaft has turned beyond the reading when the encoder reads `reading`, rad.
-    pub(super) fn beyond(&self, reading: f64) -> f64 {
+    pub(in crate::simulation) fn beyond(&self, reading: f64) -> f64 {
         match *self {
             Encoder::OffAxis { eccentricity, direction } => {
                 // Seen from the disc's centre, the head has moved on by this, and so has the graduation under it.
@@ -85,24 +85,24 @@ impl Encoder {
 
 /// The wave generator of a strain-wave gear, whose two lobes push the teeth a little too far or too little.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct WaveGenerator {
+pub(in crate::simulation) struct WaveGenerator {
     /// Of the output, rad.
-    pub(super) amplitude: f64,
+    pub(in crate::simulation) amplitude: f64,
     /// Turns of the wave generator per turn of the output.
-    pub(super) ratio: f64,
+    pub(in crate::simulation) ratio: f64,
     /// rad.
-    pub(super) phase: f64,
+    pub(in crate::simulation) phase: f64,
 }
 
 /// A sector of worn teeth: the output stands behind where it should, most in the middle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct WornSector {
+pub(in crate::simulation) struct WornSector {
     /// In the middle, rad.
-    pub(super) depth: f64,
+    pub(in crate::simulation) depth: f64,
     /// rad.
-    pub(super) centre: f64,
+    pub(in crate::simulation) centre: f64,
     /// rad.
-    pub(super) half_width: f64,
+    pub(in crate::simulation) half_width: f64,
 }
 
 impl WornSector {
@@ -119,11 +119,11 @@ impl WornSector {
 /// round with the motion. Dahl's equation `dδ/dq = −(amplitude · sgn dq + δ) / travel · sgn dq` is linear as long as the direction
 /// lasts, so that every move is integrated exactly.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Memory {
+pub(in crate::simulation) struct Memory {
     /// rad.
-    pub(super) amplitude: f64,
+    pub(in crate::simulation) amplitude: f64,
     /// rad.
-    pub(super) travel: f64,
+    pub(in crate::simulation) travel: f64,
 }
 
 /// What is left of a move so many times `travel` ago is below the last bit.
@@ -149,7 +149,7 @@ impl Memory {
 
 impl Drive {
     /// The output's coordinate, without what the loads do to it, rad or m.
-    pub(super) fn output(&self, joint: usize, conditions: &Conditions) -> f64 {
+    pub(in crate::simulation) fn output(&self, joint: usize, conditions: &Conditions) -> f64 {
         let q = conditions.joints[joint];
         let encoders: f64 = self.encoders.iter().map(|encoder| encoder.beyond(q)).sum();
         let waves: f64 = self.wave_generators.iter().map(|w| w.amplitude * libm::cos(2.0 * (w.ratio * q) + w.phase)).sum();

@@ -10,7 +10,7 @@
 //! - a root frame that moves or leans in the world (gravity does not), a tool that moves on its link;
 //! - servos that answer to what their sensors read.
 //!
-//! How exactly is said at the top of each file in `mechanism`, one per kind.
+//! How exactly is said at the top of each file in [`effect`](crate::simulation::effect), one per kind.
 //!
 //! What the sensor does is in `cell::sensor`. Several effects at one joint are in series from the motor outwards: drive train,
 //! clearance, backlash, lost motion, springs, bending. Only this module sees rapier, and only `convert` sees both kinds of vectors.
@@ -30,10 +30,10 @@
 pub mod clearance;
 pub mod conditions;
 mod convert;
-mod coordinate;
-mod drive_train;
+pub(super) mod coordinate;
+pub(super) mod drive_train;
 pub mod error;
-mod mechanism;
+pub(super) mod mechanism;
 pub mod physical_arm;
 mod play;
 pub mod settling;
@@ -42,8 +42,8 @@ mod static_seat;
 mod test_arms;
 #[cfg(test)]
 mod tests;
-mod true_arm;
-mod world;
+pub(super) mod true_arm;
+pub(super) mod world;
 
 pub use clearance::{Clearance, Seat, SeatedBy};
 pub use conditions::{Conditions, Stop};

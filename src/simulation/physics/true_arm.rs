@@ -16,7 +16,7 @@ use crate::simulation::effect::Effect;
 
 /// Segments, masses and clearances of the arm with its true parameters.
 #[derive(Clone, Debug)]
-pub(super) struct TrueArm {
+pub(in crate::simulation) struct TrueArm {
     /// `link_from_joint` of each joint, and last `link_from_tool`; see [`crate::arm::ChainAt::segments`].
     pub(super) segments: Vec<Pose>,
     /// How each joint moves.
@@ -43,7 +43,7 @@ pub(super) struct TrueArm {
     /// Pose of that link's frame in the frame after the joint's motion: turned where a URDF's axis is not z.
     pub(super) joint_from_link: Vec<Pose>,
     /// m/s².
-    pub(super) gravity_in_base: Vector3<f64>,
+    pub(in crate::simulation) gravity_in_base: Vector3<f64>,
     /// Pose of the base link's frame in the chain's first frame.
     pub(super) base_from_base_link: Pose,
     /// Below these loads a joint's coordinates do not move.
@@ -54,17 +54,17 @@ pub(super) struct TrueArm {
 
 /// Where an arm is to be, but for what yields.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Placement {
+pub(in crate::simulation) struct Placement {
     /// Outputs of the drive trains, rad or m.
-    pub(super) joints: Vec<f64>,
+    pub(in crate::simulation) joints: Vec<f64>,
     /// Growth of each segment, base to first joint first; 1 where nothing grows.
     pub(super) growth: Vec<f64>,
     /// `world_from_base`: where the base has moved to.
-    pub(super) base_shift: Option<Pose>,
+    pub(in crate::simulation) base_shift: Option<Pose>,
     /// Where the tool has moved to on its link.
     pub(super) tool_shift: Option<Pose>,
     /// Mass at the tool's origin, kg.
-    pub(super) payload_kg: f64,
+    pub(in crate::simulation) payload_kg: f64,
 }
 
 /// Loads below which the friction of a fit keeps it where it is.

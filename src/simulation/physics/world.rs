@@ -74,7 +74,7 @@ struct JointLinks {
 }
 
 /// The multibody, its joints' frames as last placed, and rapier around it.
-pub(super) struct World {
+pub(in crate::simulation) struct World {
     rapier: PhysicsWorld,
     multibody: MultibodyIndex,
     links: Vec<JointLinks>,
@@ -326,7 +326,7 @@ impl World {
     }
 
     /// Frame of joint `joint` before its motion, as last placed.
-    pub(super) fn base_from_joint(&self, joint: usize) -> Pose {
+    pub(in crate::simulation) fn base_from_joint(&self, joint: usize) -> Pose {
         let first = self.link(self.links[joint].first);
         let inboard = match first.parent_id() {
             Some(parent) => self.base_from(parent),
@@ -336,7 +336,7 @@ impl World {
     }
 
     /// The moment of gravity on joint `from`'s link, all outboard of it and the payload, about `centre`, N·m, as last placed.
-    pub(super) fn moment_about(&self, arm: &TrueArm, centre: &Vector3<f64>, from: usize) -> Vector3<f64> {
+    pub(in crate::simulation) fn moment_about(&self, arm: &TrueArm, centre: &Vector3<f64>, from: usize) -> Vector3<f64> {
         let masses = (from..self.links.len())
             .map(|outer| self.base_from(self.links[outer].body) * arm.inertials[outer].centre_of_mass_in_link)
             .chain([Point3::from(self.base_from_tool().translation.vector)]);

@@ -1,8 +1,8 @@
 //! An encoder disc off its axis, or behind a Hooke joint; the servo turns until the head reads the command.
 
-use super::{Checks, Mechanisms};
 use crate::simulation::physics::PhysicsError;
 use crate::simulation::physics::drive_train::Encoder;
+use crate::simulation::physics::mechanism::{Checks, Mechanisms};
 
 pub(super) fn add(
     parts: &mut Mechanisms,

@@ -1,7 +1,7 @@
 //! A gear train from the motor to the output whose ratio is off, and from the motor of another joint.
 
-use super::{Checks, Mechanisms};
 use crate::simulation::physics::PhysicsError;
+use crate::simulation::physics::mechanism::{Checks, Mechanisms};
 
 pub(super) fn add(
     parts: &mut Mechanisms,

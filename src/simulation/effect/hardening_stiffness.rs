@@ -1,8 +1,8 @@
 //! The tangent of a spring that hardens, renewed every step.
 
-use super::{Checks, Mechanisms};
 use crate::simulation::physics::PhysicsError;
 use crate::simulation::physics::coordinate::{Direction, Law};
+use crate::simulation::physics::mechanism::{Checks, Mechanisms};
 
 pub(super) fn add(
     parts: &mut Mechanisms,

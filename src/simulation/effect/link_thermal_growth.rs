@@ -1,8 +1,8 @@
 //! Segments that scale with the temperature of the link that they are on.
 
-use super::{Checks, Mechanisms};
 use crate::simulation::effect::{Foot, Growing};
 use crate::simulation::physics::PhysicsError;
+use crate::simulation::physics::mechanism::{Checks, Mechanisms};
 
 pub(super) fn add(parts: &mut Mechanisms, checks: &Checks<'_>, of: Growing, expansion: f64) -> Result<(), PhysicsError> {
     if expansion.abs() > 1e-3 || !expansion.is_finite() {

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::{Checks, Mechanisms};
 use crate::simulation::physics::PhysicsError;
+use crate::simulation::physics::mechanism::{Checks, Mechanisms};
 use crate::simulation::physics::true_arm::{Placement, TrueArm};
 use crate::simulation::physics::world::World;
 
@@ -16,7 +16,13 @@ pub(super) fn add(parts: &mut Mechanisms, checks: &Checks<'_>, joint: usize, gai
 
 /// Turns each joint further by what its servo takes for a torque error: the moment of gravity on what it carries, about the x axis of its
 /// frame.
-pub(super) fn answer(gains: &[f64], arm: &TrueArm, world: &World, unloaded: &Placement, placement: &mut Placement) {
+pub(in crate::simulation) fn answer(
+    gains: &[f64],
+    arm: &TrueArm,
+    world: &World,
+    unloaded: &Placement,
+    placement: &mut Placement,
+) {
     for (joint, gain) in gains.iter().enumerate().filter(|(_, gain)| **gain != 0.0) {
         let base_from_joint = world.base_from_joint(joint);
         let moment = world.moment_about(arm, &base_from_joint.translation.vector, joint);

@@ -1,8 +1,8 @@
 //! A gear train with a sector of worn teeth.
 
-use super::{Checks, Mechanisms};
 use crate::simulation::physics::PhysicsError;
 use crate::simulation::physics::drive_train::WornSector;
+use crate::simulation::physics::mechanism::{Checks, Mechanisms};
 
 pub(super) fn add(parts: &mut Mechanisms, checks: &Checks<'_>, joint: usize, sector: WornSector) -> Result<(), PhysicsError> {
     checks.turns(joint)?;

@@ -1,8 +1,8 @@
 //! The tool moves on its link at once.
 
-use super::{Checks, Mechanisms};
-use super::{Shift, When};
 use crate::simulation::physics::PhysicsError;
+use crate::simulation::physics::mechanism::{Checks, Mechanisms};
+use crate::simulation::physics::mechanism::{Shift, When};
 use nalgebra::Vector3;
 
 pub(super) fn add(

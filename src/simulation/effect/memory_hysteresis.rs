@@ -1,8 +1,8 @@
 //! Dahl's friction, exact for each straight move of the session.
 
-use super::{Checks, Mechanisms};
 use crate::simulation::physics::PhysicsError;
 use crate::simulation::physics::drive_train::Memory;
+use crate::simulation::physics::mechanism::{Checks, Mechanisms};
 
 pub(super) fn add(parts: &mut Mechanisms, checks: &Checks<'_>, joint: usize, memory: Memory) -> Result<(), PhysicsError> {
     checks.exists("joint", joint)?;

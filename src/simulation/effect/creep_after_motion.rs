@@ -1,8 +1,8 @@
 //! A spring and a damper beside it, stepped exactly over each stop of the session.
 
-use super::{Checks, Mechanisms};
 use crate::simulation::physics::PhysicsError;
 use crate::simulation::physics::coordinate::{Direction, Law};
+use crate::simulation::physics::mechanism::{Checks, Mechanisms};
 
 pub(super) fn add(
     parts: &mut Mechanisms,

@@ -1,8 +1,8 @@
 //! Radial, axial and tilting play of a bearing: free, limited coordinates that gravity seats, unless friction holds them in the middle.
 
-use super::{Checks, Mechanisms};
 use crate::simulation::physics::PhysicsError;
 use crate::simulation::physics::clearance::Clearance;
+use crate::simulation::physics::mechanism::{Checks, Mechanisms};
 
 pub(super) fn add(
     parts: &mut Mechanisms,

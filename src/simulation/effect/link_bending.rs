@@ -2,10 +2,10 @@
 //! Cardan joints of half the compliance each across the beam, where Gauss's rule with two points wants them: rotation and deflection at
 //! the beam's end are integrals of at most cubic polynomials along it, for which that rule is exact.
 
-use super::{Checks, Mechanisms};
 use crate::simulation::physics::PhysicsError;
 use crate::simulation::physics::coordinate::BEAM_POINTS;
 use crate::simulation::physics::coordinate::{Direction, Law};
+use crate::simulation::physics::mechanism::{Checks, Mechanisms};
 
 pub(super) fn add(
     parts: &mut Mechanisms,

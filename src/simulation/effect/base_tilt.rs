@@ -2,9 +2,9 @@
 
 use nalgebra::{Translation3, Vector3};
 
-use super::{Checks, Mechanisms};
 use crate::arm::frames::{Pose, rotation_from_vector};
 use crate::simulation::physics::PhysicsError;
+use crate::simulation::physics::mechanism::{Checks, Mechanisms};
 use crate::simulation::physics::true_arm::{Placement, TrueArm};
 use crate::simulation::physics::world::World;
 
@@ -15,7 +15,13 @@ pub(super) fn add(parts: &mut Mechanisms, checks: &Checks<'_>, compliance: f64) 
 }
 
 /// Leans the base, wherever it has moved to, under the moment across gravity.
-pub(super) fn answer(compliance: f64, arm: &TrueArm, world: &World, unloaded: &Placement, placement: &mut Placement) {
+pub(in crate::simulation) fn answer(
+    compliance: f64,
+    arm: &TrueArm,
+    world: &World,
+    unloaded: &Placement,
+    placement: &mut Placement,
+) {
     if compliance == 0.0 {
         return;
     }

@@ -1,8 +1,8 @@
 //! A spring in every joint, relaxed where a servo that knows the believed payload would put it, and a payload that is another.
 
-use super::{Checks, Mechanisms};
 use crate::simulation::physics::PhysicsError;
 use crate::simulation::physics::coordinate::{Direction, Law};
+use crate::simulation::physics::mechanism::{Checks, Mechanisms};
 
 pub(super) fn add(parts: &mut Mechanisms, checks: &Checks<'_>, excess: f64, stiffness: f64) -> Result<(), PhysicsError> {
     if !(-1000.0..=1000.0).contains(&excess) {

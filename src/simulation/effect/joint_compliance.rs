@@ -1,8 +1,8 @@
 //! A free coordinate about the joint's axis with rapier's passive spring.
 
-use super::{Checks, Mechanisms};
 use crate::simulation::physics::PhysicsError;
 use crate::simulation::physics::coordinate::{Direction, Law};
+use crate::simulation::physics::mechanism::{Checks, Mechanisms};
 
 pub(super) fn add(parts: &mut Mechanisms, checks: &Checks<'_>, joint: usize, stiffness: f64) -> Result<(), PhysicsError> {
     checks.exists("joint", joint)?;

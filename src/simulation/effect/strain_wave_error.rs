@@ -1,8 +1,8 @@
 //! A wave generator whose two lobes push the teeth a little too far or too little.
 
-use super::{Checks, Mechanisms};
 use crate::simulation::physics::PhysicsError;
 use crate::simulation::physics::drive_train::WaveGenerator;
+use crate::simulation::physics::mechanism::{Checks, Mechanisms};
 
 pub(super) fn add(
     parts: &mut Mechanisms,

@@ -1,7 +1,55 @@
 //! What can be wrong with an arm, its cell and its sensor besides the geometric parameters: the hidden part of a scene, in SI.
 //!
-//! These are descriptions; [`physics`](crate::simulation::physics) and [`cell`](crate::simulation::cell) make them happen. True = reading + effect.
+//! True = reading + effect. Beside each description stands what it adds to the parts of the true arm that make it happen, one file per
+//! kind; effects of one kind at one place add up. What a sensor does to its reading is none of the arm's:
+//! [`cell`](crate::simulation::cell) does that.
 //! An effect comes from a scene ([`Effect::from_values`]) or is drawn ([`Effect::drawn`]).
+
+// What makes each happen.
+#[cfg(feature = "simulator")]
+mod backlash;
+#[cfg(feature = "simulator")]
+mod base_drift;
+#[cfg(feature = "simulator")]
+mod base_step;
+#[cfg(feature = "simulator")]
+pub(super) mod base_tilt;
+#[cfg(feature = "simulator")]
+mod bearing_clearance;
+#[cfg(feature = "simulator")]
+mod creep_after_motion;
+#[cfg(feature = "simulator")]
+mod gear_coupling;
+#[cfg(feature = "simulator")]
+mod gravity_lost_motion;
+#[cfg(feature = "simulator")]
+mod hardening_stiffness;
+#[cfg(feature = "simulator")]
+mod joint_compliance;
+#[cfg(feature = "simulator")]
+mod joint_eccentricity;
+#[cfg(feature = "simulator")]
+mod joint_thermal_drift;
+#[cfg(feature = "simulator")]
+mod link_bending;
+#[cfg(feature = "simulator")]
+mod link_thermal_growth;
+#[cfg(feature = "simulator")]
+mod measurement_outliers;
+#[cfg(feature = "simulator")]
+mod measurement_scale;
+#[cfg(feature = "simulator")]
+mod memory_hysteresis;
+#[cfg(feature = "simulator")]
+pub(super) mod moment_crosstalk;
+#[cfg(feature = "simulator")]
+mod strain_wave_error;
+#[cfg(feature = "simulator")]
+mod tool_step;
+#[cfg(feature = "simulator")]
+mod worn_tooth_sector;
+#[cfg(feature = "simulator")]
+mod wrong_payload;
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,6 +59,14 @@ use crate::arm::Arm;
 pub use crate::effects::values::{Foot, Moves, Values};
 use crate::effects::{Kind, Level, Location};
 use crate::seed::Stream;
+#[cfg(feature = "simulator")]
+use crate::simulation::physics::PhysicsError;
+#[cfg(feature = "simulator")]
+use crate::simulation::physics::clearance::Clearance;
+#[cfg(feature = "simulator")]
+use crate::simulation::physics::drive_train::{Memory, WaveGenerator, WornSector};
+#[cfg(feature = "simulator")]
+use crate::simulation::physics::mechanism::{Checks, Mechanisms};
 
 /// An un-modelled effect with its place and its magnitude. Joints and links count from 0 here; link `i` moves with joint `i`.
 #[derive(Clone, Debug, PartialEq)]
@@ -205,6 +261,56 @@ pub enum Effect {
         /// N·m/rad³.
         cubic: f64,
     },
+}
+
+#[cfg(feature = "simulator")]
+impl Effect {
+    /// Adds what makes it happen to the parts of an arm.
+    pub(super) fn add(&self, parts: &mut Mechanisms, checks: &Checks<'_>) -> Result<(), PhysicsError> {
+        match *self {
+            Effect::JointCompliance { joint, stiffness } => joint_compliance::add(parts, checks, joint, stiffness),
+            Effect::LinkBending { link, compliance, beam } => link_bending::add(parts, checks, link, compliance, beam),
+            Effect::Backlash { joint, width } => backlash::add(parts, checks, joint, width),
+            Effect::GravityLostMotion { joint, width } => gravity_lost_motion::add(parts, checks, joint, width),
+            Effect::JointEccentricity { joint, amplitude, order, phase } => {
+                joint_eccentricity::add(parts, checks, joint, amplitude, order, phase)
+            }
+            Effect::StrainWaveError { joint, amplitude, ratio, phase } => {
+                strain_wave_error::add(parts, checks, joint, WaveGenerator { amplitude, ratio, phase })
+            }
+            Effect::GearCoupling { joint, ratio_error, coupling, source } => {
+                gear_coupling::add(parts, checks, joint, ratio_error, (source, coupling))
+            }
+            Effect::LinkThermalGrowth { of, expansion } => link_thermal_growth::add(parts, checks, of, expansion),
+            Effect::JointThermalDrift { joint, drift } => joint_thermal_drift::add(parts, checks, joint, drift),
+            Effect::Clearance { joint, radial, axial, tilt, held } => {
+                let clearance = Clearance { radial_m: radial, axial_m: axial, tilt_rad: tilt };
+                bearing_clearance::add(parts, checks, joint, clearance, held)
+            }
+            Effect::BaseDrift { moves, translation, rotation } => base_drift::add(parts, checks, moves, (translation, rotation)),
+            Effect::BaseStep { moves, translation, rotation, after } => {
+                base_step::add(parts, checks, moves, (translation, rotation), after)
+            }
+            Effect::BaseTilt { compliance } => base_tilt::add(parts, checks, compliance),
+            Effect::ToolStep { translation, rotation, after } => tool_step::add(parts, checks, (translation, rotation), after),
+            Effect::MeasurementScale { scale } => measurement_scale::check(checks, scale),
+            Effect::MeasurementOutliers { share, factor } => measurement_outliers::check(checks, share, factor),
+            Effect::WornToothSector { joint, depth, centre, half_width } => {
+                worn_tooth_sector::add(parts, checks, joint, WornSector { depth, centre, half_width })
+            }
+            Effect::CreepAfterMotion { joint, compliance, time_constant } => {
+                creep_after_motion::add(parts, checks, joint, compliance, time_constant)
+            }
+            Effect::MomentCrosstalk { joint, gain } => moment_crosstalk::add(parts, checks, joint, gain),
+            Effect::MemoryHysteresis { joint, amplitude, travel } => {
+                memory_hysteresis::add(parts, checks, joint, Memory { amplitude, travel })
+            }
+            Effect::WrongPayload { excess, stiffness } => wrong_payload::add(parts, checks, excess, stiffness),
+            Effect::HardeningStiffness { joint, stiffness, cubic } => {
+                hardening_stiffness::add(parts, checks, joint, stiffness, cubic)
+            }
+        }
+    }
 }
 
 /// What grows with temperature.
