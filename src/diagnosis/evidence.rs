@@ -231,11 +231,12 @@ impl<'a> Evidence<'a> {
     }
 
     /// Logarithm of the marginal likelihood of the readings with `members`, up to what does not depend on members and on the
-    /// geometry's prior: for the comparison of such priors.
+    /// geometry's prior: for the comparison of such priors. What the prior says counts as readings do, so that as many numbers are
+    /// explained whatever it is.
     #[must_use]
     pub(crate) fn log_likelihood(&self, members: &[(usize, usize)]) -> f64 {
         let (drop, log_determinant) = self.solve(members).map_or((0.0, 0.0), |model| (model.drop, model.log_determinant));
-        let degrees = self.noise.degrees_of_freedom + self.marginal.degrees_of_freedom;
+        let degrees = self.noise.degrees_of_freedom + self.marginal.beyond_free;
         let left = self.noise.degrees_of_freedom * self.noise.level + self.marginal.residual - drop;
         self.marginal.log_geometry - 0.5 * log_determinant - 0.5 * degrees * libm::log(left.max(1e-12))
     }

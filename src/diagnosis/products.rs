@@ -281,6 +281,8 @@ pub(crate) struct Marginal<'a> {
     pub(crate) residual: f64,
     /// Equations that the geometry leaves.
     pub(crate) degrees_of_freedom: f64,
+    /// Equations beyond the parameters that have no prior.
+    pub(crate) beyond_free: f64,
     /// Logarithm of the evidence's part that the geometry's prior decides: half the log determinant of prior precision over posterior's.
     pub(crate) log_geometry: f64,
     rows: RwLock<BTreeMap<usize, Arc<Vec<f64>>>>,
@@ -333,6 +335,7 @@ impl<'a> Marginal<'a> {
         let residual = (residual - taken(last, last)).max(1e-12);
         Some(Marginal {
             degrees_of_freedom: (equations - (count as f64 - pinned)).max(1.0),
+            beyond_free: (equations - prior.free.iter().filter(|free| **free).count() as f64).max(1.0),
             products,
             left_out,
             mixed,
