@@ -162,6 +162,8 @@ struct State {
     upright: Option<Vec<bool>>,
     /// Whether what was found about it could not be taken as it is.
     astray: bool,
+    /// What a calibration leaves ([`rows::First`]).
+    calibrated: DVector<f64>,
 }
 
 impl State {
@@ -182,14 +184,16 @@ impl State {
             loads: Loads::AsItStands,
             upright: None,
             astray: false,
+            calibrated: DVector::zeros(0),
         }
     }
 
     /// Nothing found; rows that are far off from what geometry makes of the others count little, as what they pull awry hides all else.
     fn robust(data: &Data<'_>) -> Result<State, DiagnosisError> {
         let state = State::nominal(data);
-        let far = rows::first_fit(data.arm, data.sensor, data.measurements, &data.options.settings.model)?.far;
-        Ok(State { far: if far.is_empty() { state.far } else { far }, ..state })
+        let rows::First { far, calibrated } =
+            rows::first_fit(data.arm, data.sensor, data.measurements, &data.options.settings.model)?;
+        Ok(State { far: if far.is_empty() { state.far } else { far }, calibrated, ..state })
     }
 
     fn weights(&self) -> Vec<f64> {
@@ -525,13 +529,10 @@ pub fn diagnose(
         &units,
         settings.validation.permutations,
     );
-    // What a calibration leaves, whose prior is that of manufacturing ([`crate::identification::identify_real`]).
-    let calibrated = Marginal::new(&pass.products, None, &linear.prior.scaled(1.0)).ok_or(GeometryError::Degenerate)?;
-    let geometry_alone = linear.left(&calibrated.geometry(&[]), &DVector::zeros(residual.len()));
     let orientation_sigma_rad = sensor.orientation_sigma_rad.map(|sigma| sigma * state.orientation);
     let analysis = Analysis {
         moved: moved(&linear, &evidence, &found.best),
-        residuals: residuals(&pass.rows, measurements, &geometry_alone, &residual),
+        residuals: residuals(&pass.rows, measurements, &state.calibrated, &residual),
         maps: open_set::maps(&pass.conditions, &pass.rows.shifts(&residual), settings.validation.bins),
         linear: &linear,
         conditions: &pass.conditions,

@@ -146,6 +146,14 @@ pub fn check_robot(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], se
     }
 }
 
+/// What geometry alone makes of readings.
+pub(crate) struct First {
+    /// Weight of each row for being far off from what the others say.
+    pub(crate) far: Vec<f64>,
+    /// What a calibration leaves ([`crate::identification::identify_real`]), m and rad.
+    pub(crate) calibrated: DVector<f64>,
+}
+
 /// Fits `arm` alone to `measurements`, and refuses those that are none of its. What effects and geometry do together later is no reason to
 /// doubt the robot.
 ///
@@ -156,9 +164,11 @@ pub(crate) fn first_fit(
     sensor: &Sensor,
     measurements: &[&Measurement],
     settings: &Model,
-) -> Result<Rows, DiagnosisError> {
+) -> Result<First, DiagnosisError> {
     let weights = vec![1.0; measurements.len()];
-    let rows = fit(arm, Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[] })?;
+    let readings = geometry::Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[] };
+    let loose = geometry::fit(arm, readings)?;
+    let rows = of_geometry(arm, measurements, loose.clone());
     let mechanism = Mechanism::new(arm);
     let reach: f64 = mechanism.segments.iter().map(|segment| segment.translation.vector.norm()).sum();
     let equations = &rows.equations;
@@ -183,7 +193,7 @@ pub(crate) fn first_fit(
             hint: mistake::hint(arm, measurements, settings.mended),
         });
     }
-    Ok(rows)
+    Ok(First { far: rows.far, calibrated: geometry::shrunk_residual(arm, readings, &loose)? })
 }
 
 /// Fits base, target and geometry of `arm` to `readings`. Sessions get bases of their own where that is worth it.
@@ -194,6 +204,10 @@ pub(crate) fn fit(arm: &Arm, readings: Readings<'_>) -> Result<Rows, DiagnosisEr
     let Readings { sensor, measurements, weights, displacement, scatter } = readings;
     let scatter: Vec<(usize, f64)> = scatter.iter().map(|one| (one.joint, one.sigma)).collect();
     let fitted = geometry::fit(arm, geometry::Readings { sensor, measurements, weights, displacement, scatter: &scatter })?;
+    Ok(of_geometry(arm, measurements, fitted))
+}
+
+fn of_geometry(arm: &Arm, measurements: &[&Measurement], fitted: geometry::Geometry) -> Rows {
     let mechanism = Mechanism::new(arm).with_chain(fitted.root_to_tool());
     let postures: Vec<Posture> =
         measurements.iter().map(|row| mechanism.posture(&row.joints, row.payload_kg.unwrap_or(0.0))).collect();
@@ -205,7 +219,7 @@ pub(crate) fn fit(arm: &Arm, readings: Readings<'_>) -> Result<Rows, DiagnosisEr
         .collect();
     let turns: Vec<Matrix3<f64>> =
         fitted.measurement_from_root().iter().map(|base| base.rotation.to_rotation_matrix().into_inner()).collect();
-    Ok(Rows {
+    Rows {
         mechanism,
         turn: fitted.session.iter().map(|session| turns[*session]).collect(),
         parameters: fitted.parameters().clone(),
@@ -219,5 +233,5 @@ pub(crate) fn fit(arm: &Arm, readings: Readings<'_>) -> Result<Rows, DiagnosisEr
         far: fitted.far,
         free: fitted.free,
         notes: fitted.notes,
-    })
+    }
 }

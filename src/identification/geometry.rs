@@ -4,7 +4,7 @@
 //! Base and target are free, each session may have a base of its own and each target on the tool has its place. Every joint frame but the
 //! first is off by six small errors ([`FrameErrors`]) with Gaussian priors of the size that machining and assembly leave.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
 
 use super::least_squares::{difference, turn_to_residual};
 use crate::arm::chain::FrameErrors;
@@ -12,6 +12,7 @@ use crate::arm::frames::{Pose, pose_from_parts, registration, rotation_from_vect
 use crate::arm::{Arm, ChainAt};
 use crate::measurement::equations::{COMPONENTS, Equations};
 use crate::measurement::{Measurement, Sensor};
+use crate::numerics::{gram, product};
 use crate::solver::whitening::Whitening;
 use crate::solver::{Fit, Linearised, Problem, Stop, robust, solve};
 
@@ -19,6 +20,8 @@ use crate::solver::{Fit, Linearised, Problem, Stop, robust, solve};
 pub const FRAME_SHIFT: f64 = 5e-3;
 /// One sigma of a joint frame's orientation, rad.
 pub const FRAME_TURN: f64 = 10e-3;
+/// Sigmas of the frames' priors over those of manufacturing that an arm may have: the readings say which.
+pub const SCALES: [f64; 7] = [3.0, 1.0, 0.3, 0.1, 0.03, 0.01, 0.003];
 /// Base and target are free: so wide, about where the fit finds them, that it never binds; m and rad.
 pub const FREE: f64 = 50e-3;
 /// Different configurations that a fit needs.
@@ -109,6 +112,8 @@ pub struct Geometry {
     pub free: Vec<bool>,
     /// Weight of each row beside those asked for: less than one where it is far off from what the others say.
     pub far: Vec<f64>,
+    /// Mean square of the noise over the declared one, where it is larger than that; else one.
+    pub level: f64,
     /// Sum of squares of whitened residuals and of the prior's pull.
     pub cost: f64,
     /// Why the fit ended.
@@ -120,6 +125,27 @@ pub struct Geometry {
 }
 
 impl Geometry {
+    /// Sigmas of the frames' priors over those of manufacturing.
+    #[must_use]
+    pub fn scale(&self) -> f64 {
+        self.placed.scale
+    }
+
+    /// The scale of [`SCALES`] of which the readings are likeliest: marginal likelihood to first order, base and target free, the
+    /// noise's size unknown.
+    #[must_use]
+    pub fn likeliest_scale(&self) -> f64 {
+        let sigma = libm::sqrt(self.level);
+        let residual = self.whitening.of_vector(&self.residual) / sigma;
+        let jacobian = self.whitening.of(&self.jacobian) / sigma;
+        let normal = gram(&jacobian);
+        let with_residual = product(&jacobian.transpose(), &DMatrix::from_column_slice(residual.len(), 1, residual.as_slice()));
+        let square = residual.norm_squared();
+        let of = |scale: f64| likelihood(&normal, &with_residual, square, residual.len(), &self.placed, &self.free, scale);
+        let likeliest = SCALES.into_iter().map(|scale| (of(scale), scale)).max_by(|a, b| a.0.total_cmp(&b.0));
+        likeliest.map_or(1.0, |(_, scale)| scale)
+    }
+
     /// The fitted parameters over the sigmas of their priors; zero where free.
     #[must_use]
     pub fn parameters(&self) -> &DVector<f64> {
@@ -167,17 +193,72 @@ impl Geometry {
     }
 }
 
+/// Logarithm of the marginal likelihood of readings about a fit at `placed`, up to what does not depend on `scale`. `normal`,
+/// `with_residual`, `square`: inner products of the whitened Jacobian and residual (of `equations` equations).
+fn likelihood(
+    normal: &DMatrix<f64>,
+    with_residual: &DMatrix<f64>,
+    square: f64,
+    equations: usize,
+    placed: &Placed,
+    free: &[bool],
+    scale: f64,
+) -> f64 {
+    let (mut normal, mut with_residual, mut square) = (normal.clone(), with_residual.clone(), square);
+    let mut log = 0.0;
+    for at in 0..free.len() {
+        // The fit's own prior is one in its units.
+        let precision = if free[at] { 1.0 } else { (placed.scale / scale).powi(2) };
+        let offset = placed.parameters[at];
+        normal[(at, at)] += precision;
+        with_residual[at] -= precision * offset;
+        square += precision * offset * offset;
+        log += 0.5 * libm::log(precision);
+    }
+    let Some(cholesky) = Cholesky::new(normal) else {
+        return f64::NEG_INFINITY;
+    };
+    log -= (0..free.len()).map(|at| libm::log(cholesky.l_dirty()[(at, at)])).sum::<f64>();
+    let left = square - with_residual.dot(&cholesky.solve(&with_residual));
+    let beyond = equations.saturating_sub(free.iter().filter(|free| **free).count()).max(1) as f64;
+    log - 0.5 * beyond * libm::log(left.max(1e-12))
+}
+
 /// Fits base, target and geometry of `arm` to `readings`. Sessions get bases of their own where that is worth it.
 ///
 /// # Errors
 /// If the readings cannot tell.
 pub fn fit(arm: &Arm, readings: Readings<'_>) -> Result<Geometry, GeometryError> {
+    fit_at(arm, readings, 1.0)
+}
+
+/// The same with priors of the size that the readings speak for ([`Geometry::likeliest_scale`]): few or coarse readings of an arm that
+/// is made well leave it nearly nominal, where priors of manufacturing would make it worse.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_shrunk(arm: &Arm, readings: Readings<'_>) -> Result<Geometry, GeometryError> {
+    let loose = fit(arm, readings)?;
+    let scale = loose.likeliest_scale();
+    if scale == loose.scale() { Ok(loose) } else { fit_at(arm, readings, scale) }
+}
+
+/// The residual that [`fit_shrunk`] leaves (m and rad), where `loose` is what [`fit`] makes of the same readings.
+///
+/// # Errors
+/// As [`fit`].
+pub fn shrunk_residual(arm: &Arm, readings: Readings<'_>, loose: &Geometry) -> Result<DVector<f64>, GeometryError> {
+    let scale = loose.likeliest_scale();
+    if scale == loose.scale() { Ok(loose.residual.clone()) } else { Ok(fit_at(arm, readings, scale)?.residual) }
+}
+
+fn fit_at(arm: &Arm, readings: Readings<'_>, scale: f64) -> Result<Geometry, GeometryError> {
     let (names, session) = numbered(readings.measurements, |row| row.session.as_deref());
-    let together = fit_with(arm, readings, &vec![0; session.len()], vec![String::new()])?;
+    let together = fit_with(arm, readings, &vec![0; session.len()], vec![String::new()], scale)?;
     if names.len() < 2 {
         return Ok(together);
     }
-    let apart = fit_with(arm, readings, &session, names.clone())?;
+    let apart = fit_with(arm, readings, &session, names.clone(), scale)?;
     let added = (FrameErrors::PER_FRAME * (names.len() - 1)) as f64;
     let left = (apart.residual.len() as f64 - apart.jacobian.ncols() as f64).max(1.0);
     if (together.cost - apart.cost) / added < OWN_BASE * apart.cost / left {
@@ -212,9 +293,15 @@ fn numbered<'a>(measurements: &[&'a Measurement], of: impl Fn(&'a Measurement) -
     (names.into_iter().map(str::to_owned).collect(), which)
 }
 
-/// As [`fit`]; `session` of each row, which have these names.
-fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], sessions: Vec<String>) -> Result<Geometry, GeometryError> {
-    let mut problem = Placing::new(arm, readings, session, sessions.len())?;
+/// As [`fit`] with sigmas of the frames' priors of `scale` times those of manufacturing; `session` of each row, which have these names.
+fn fit_with(
+    arm: &Arm,
+    readings: Readings<'_>,
+    session: &[usize],
+    sessions: Vec<String>,
+    scale: f64,
+) -> Result<Geometry, GeometryError> {
+    let mut problem = Placing::new(arm, readings, session, sessions.len(), scale)?;
     let start = problem.start(arm)?;
     let free = problem.free.clone();
     let of_free: Vec<usize> = (0..free.len()).filter(|column| free[*column]).collect();
@@ -235,6 +322,7 @@ fn fit_with(arm: &Arm, readings: Readings<'_>, session: &[usize], sessions: Vec<
     let (residual, jacobian) = problem.raw(&fit.point);
     Ok(Geometry {
         far,
+        level: problem.level,
         cost: problem.level * fit.linearised.cost(),
         stop: fit.stop,
         steps,
@@ -264,13 +352,15 @@ struct Placed {
     before: usize,
     /// Frame errors.
     count: usize,
+    /// Sigmas of the frames' priors over those of manufacturing.
+    scale: f64,
 }
 
 impl Placed {
     /// Errors of the frames, m and rad.
     fn errors(&self) -> Vec<f64> {
         let values = self.parameters.rows(self.before, self.count);
-        values.iter().enumerate().map(|(at, value)| value * sigma_of_frame(at)).collect()
+        values.iter().enumerate().map(|(at, value)| value * self.scale * sigma_of_frame(at)).collect()
     }
 }
 
@@ -299,10 +389,12 @@ struct Placing<'a> {
     /// Mean square of the noise over the declared one: the prior's sigmas are true ones, so that they count for more where the noise is
     /// larger than declared.
     level: f64,
+    /// Sigmas of the frames' priors over those of manufacturing.
+    scale: f64,
 }
 
 impl<'a> Placing<'a> {
-    fn new(arm: &Arm, readings: Readings<'a>, session: &'a [usize], bases: usize) -> Result<Self, GeometryError> {
+    fn new(arm: &Arm, readings: Readings<'a>, session: &'a [usize], bases: usize, scale: f64) -> Result<Self, GeometryError> {
         let measurements = readings.measurements;
         let expected = arm.joint_count();
         for (row, measurement) in measurements.iter().enumerate() {
@@ -325,7 +417,7 @@ impl<'a> Placing<'a> {
         let (before, count) = (FrameErrors::PER_FRAME * bases, FrameErrors::PER_FRAME * frames.frames());
         let width = before + count + per_target * targets.len();
         let free: Vec<bool> = (0..width).map(|column| !(before..before + count).contains(&column)).collect();
-        let sigma = (0..width).map(|column| if free[column] { FREE } else { sigma_of_frame(column - before) }).collect();
+        let sigma = (0..width).map(|column| if free[column] { FREE } else { scale * sigma_of_frame(column - before) }).collect();
         let whitening = Whitening::new(&equations, inverse_sigmas(&equations), readings.weights);
         let (far, level) = (Vec::new(), 1.0);
         Ok(Placing {
@@ -342,6 +434,7 @@ impl<'a> Placing<'a> {
             sigma,
             far,
             level,
+            scale,
         })
     }
 
@@ -384,6 +477,7 @@ impl<'a> Placing<'a> {
             parameters: DVector::zeros(self.free.len()),
             before: FrameErrors::PER_FRAME * self.bases,
             count: FrameErrors::PER_FRAME * self.frames.frames(),
+            scale: self.scale,
         })
     }
 

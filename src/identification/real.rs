@@ -30,8 +30,8 @@ const HARDLY_SEEN: f64 = 0.5;
 ///
 /// Readings that are far off from what the others say together (by the median of all) are left out, and named in the notes.
 ///
-/// Parameters that the data hardly show stay near their nominal values, for a prior says how far an arm of this kind is off; the notes
-/// name them.
+/// Parameters that the data hardly show stay near their nominal values, for a prior whose size the readings choose
+/// ([`geometry::fit_shrunk`]) says how far this arm is off; the notes name them.
 ///
 /// # Errors
 /// If there are too few measurements or they do not fit the arm.
@@ -71,7 +71,7 @@ fn far_off(robot: &Arm, sensor: &Sensor, measurements: &[Measurement]) -> Result
     let fit: Vec<&Measurement> = measurements.iter().filter(|row| row.role == Role::Fit).collect();
     let weights = vec![1.0; fit.len()];
     let readings = Readings { sensor, measurements: &fit, weights: &weights, displacement: &[], scatter: &[] };
-    let geometry = geometry::fit(robot, readings)?;
+    let geometry = geometry::fit_shrunk(robot, readings)?;
     let all: Vec<&Measurement> = measurements.iter().collect();
     let equations = Equations::new(sensor, &all);
     let left: Vec<_> = all.iter().map(|row| super::least_squares::difference(row, &geometry.predict(row))).collect();
@@ -99,7 +99,7 @@ fn identify_good(
     problem.enough(structure.rank())?;
     let weights = vec![1.0; fit.len()];
     let readings = Readings { sensor, measurements: &fit, weights: &weights, displacement: &[], scatter: &[] };
-    let geometry = geometry::fit(robot, readings)?;
+    let geometry = geometry::fit_shrunk(robot, readings)?;
 
     notes.extend(geometry.notes.iter().cloned());
     let (values, missed) = expressed(aligned, sensor, &structure, &geometry, &fit);
@@ -111,7 +111,7 @@ fn identify_good(
     }
     let linearised = problem.linearise(&values);
     let subspace = structure.at(&linearised.jacobian);
-    let (precision, known) = prior(aligned, &subspace);
+    let (precision, known) = prior(aligned, &subspace, geometry.scale());
     let covariance = problem.covariance(&linearised.jacobian, &subspace, Some(&precision));
     // What the prior tells is no equation's doing.
     let told: f64 = numerics::product(&precision, &covariance).trace();
@@ -120,13 +120,17 @@ fn identify_good(
         .filter(|at| known[*at].is_some_and(|known| covariance[(*at, *at)].max(0.0).sqrt() > HARDLY_SEEN * known))
         .map(|at| aligned.chain.parameters[subspace.independent[at]].name.as_str())
         .collect();
-    if !hardly.is_empty() {
+    let [shift, turn] = [geometry.scale() * FRAME_SHIFT * 1e3, geometry.scale() * FRAME_TURN * 1e3];
+    if 2 * hardly.len() > known.iter().flatten().count() {
         notes.push(format!(
-            "these configurations hardly show {}: what is said there is mostly that frames are made to {:.0} mm and {:.0} mrad; measure \
-             more different configurations, or a target further from the last axis",
-            hardly.join(", "),
-            FRAME_SHIFT * 1e3,
-            FRAME_TURN * 1e3
+            "these readings tell little of the arm's geometry: it is taken to be within about {shift:.2} mm and {turn:.2} mrad of nominal \
+             frame by frame, which is what they speak for; a calibration needs more different configurations, or a better sensor"
+        ));
+    } else if !hardly.is_empty() {
+        notes.push(format!(
+            "these configurations hardly show {}: what is said there is mostly that this arm's frames are within about {shift:.2} mm and \
+             {turn:.2} mrad of nominal; measure more different configurations, or a target further from the last axis",
+            hardly.join(", ")
         ));
     }
     let unread: Vec<&str> = ["x", "y", "z"]
@@ -195,15 +199,16 @@ fn expressed(aligned: &Arm, sensor: &Sensor, structure: &Subspace, geometry: &Ge
     (values, missed.fold(0.0, f64::max))
 }
 
-/// The prior of the independent parameters, which stand for the others too: its precision, and one sigma of each that is not free.
-fn prior(aligned: &Arm, subspace: &Subspace) -> (DMatrix<f64>, Vec<Option<f64>>) {
+/// The prior of the independent parameters, which stand for the others too, its sigmas `scale` times those of manufacturing: its
+/// precision, and one sigma of each that is not free.
+fn prior(aligned: &Arm, subspace: &Subspace, scale: f64) -> (DMatrix<f64>, Vec<Option<f64>>) {
     let parameters = &aligned.chain.parameters;
     // Base and target come first and last ([`crate::arm::Chain::in_measurement_frame`]).
     let free = |column: usize| column < 6 || column + 6 >= parameters.len();
     let sigma = |column: usize| match parameters[column].quantity {
         _ if free(column) => FREE,
-        Quantity::Length => FRAME_SHIFT,
-        Quantity::Angle => FRAME_TURN,
+        Quantity::Length => scale * FRAME_SHIFT,
+        Quantity::Angle => scale * FRAME_TURN,
     };
     let rank = subspace.rank();
     let bound: Vec<usize> = (0..rank).filter(|at| !free(subspace.independent[*at])).collect();
