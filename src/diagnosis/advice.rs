@@ -65,3 +65,54 @@ pub(super) fn next(analysis: &Analysis<'_>, sets: &[Vec<Candidate>], power: &Det
     }
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::outcome::Place;
+    use crate::diagnosis::scatter::Scatter;
+    use crate::diagnosis::tests::with_analysis;
+    use crate::effects::Level;
+    use crate::measurement::Measurement;
+
+    fn one(kind: Option<Kind>) -> Candidate {
+        let location = Place { level: Level::Joint, index: Some(2), time_s: None };
+        Candidate { kind, location, probability: 0.5, detail: String::new() }
+    }
+
+    fn nothing_seen() -> Detectability {
+        Detectability { undetectable: Vec::new(), detectable: Vec::new(), share: 0.0 }
+    }
+
+    #[test]
+    fn what_was_recorded_is_not_asked_for_again() {
+        with_analysis(
+            |_, _, _, _, _| 0.0,
+            |mut analysis| {
+                // Sides and two payloads are there, temperatures and repeats are not.
+                let asked = next(&analysis, &[], &nothing_seen(), Verdict::NotDetectable);
+                assert_eq!(asked, [Advice::RecordTemperatures, Advice::ReadTwice, Advice::MoreReadings]);
+                let with_air = |row: &&Measurement| Measurement { ambient_c: Some(20.0), ..(*row).clone() };
+                // As long as the analysis, which borrows them.
+                let rows: &'static [Measurement] = analysis.measurements.iter().map(with_air).collect::<Vec<_>>().leak();
+                analysis.measurements = rows.iter().collect::<Vec<_>>().leak();
+                assert_eq!(next(&analysis, &[], &nothing_seen(), Verdict::Explained), [Advice::WarmUp]);
+            },
+        );
+    }
+
+    #[test]
+    fn what_tells_a_set_apart_is_asked_for_once() {
+        with_analysis(
+            |_, _, _, _, _| 0.0,
+            |mut analysis| {
+                analysis.scatter = vec![Scatter { joint: 4, sigma: 1e-3, log_odds: 9.0 }];
+                let sets = vec![vec![one(Some(Kind::JointEccentricity)), one(None)], vec![one(None)]];
+                let asked = next(&analysis, &sets, &nothing_seen(), Verdict::Explained);
+                let count = |advice: &Advice| asked.iter().filter(|one| *one == advice).count();
+                assert_eq!((count(&Advice::MoreWhereItShows), count(&Advice::Repeat { joint: 5 })), (1, 1), "{asked:?}");
+                assert_eq!(asked.len(), asked.iter().filter(|one| count(one) == 1).count());
+            },
+        );
+    }
+}

@@ -190,3 +190,56 @@ fn remember(measurements: &[&Measurement], in_time: &[usize], readings: &mut [Re
 pub(crate) fn centre(points: &[Vector3<f64>]) -> Vector3<f64> {
     points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::tests::with_analysis;
+
+    /// The readings of an undisturbed arm, `count` of them, all of which are the first one.
+    fn alike(count: usize, ask: impl FnOnce(Vec<Measurement>, Vec<Reading>)) {
+        with_analysis(
+            |_, _, _, _, _| 0.0,
+            |analysis| ask(vec![analysis.measurements[0].clone(); count], vec![analysis.conditions.readings[0].clone(); count]),
+        );
+    }
+
+    #[test]
+    fn a_move_in_two_parts_is_remembered_as_the_whole_and_a_long_one_forgets_all_before() {
+        alike(4, |rows, mut readings| {
+            let rows: Vec<&Measurement> = rows.iter().collect();
+            for (at, reading) in readings.iter_mut().enumerate() {
+                // Joint 1 in two parts, joint 2 at once, joint 3 there and far back.
+                reading.joints[0] = [0.0, 0.1, 0.3, 0.3][at];
+                reading.joints[1] = [0.0, 0.0, 0.3, 0.3][at];
+                reading.joints[2] = [0.0, 0.3, -100.0, -100.0][at];
+            }
+            remember(&rows, &[0, 1, 2, 3], &mut readings);
+            for (which, length) in MEMORIES.iter().enumerate() {
+                // It lags behind its motion, and nothing is forgotten while it stands.
+                let whole = -(1.0 - (-0.3 / length).exp());
+                for joint in 0..2 {
+                    let found = [2, 3].map(|at| readings[at].memory[joint][which]);
+                    assert!(found.iter().all(|value| (value - whole).abs() < 1e-12), "{found:?} {whole}");
+                }
+                assert!((readings[2].memory[2][which] - 1.0).abs() < 1e-12);
+            }
+        });
+    }
+
+    #[test]
+    fn a_load_that_stays_is_remembered_as_it_is() {
+        alike(3, |rows, mut readings| {
+            let rows: Vec<Measurement> =
+                rows.into_iter().enumerate().map(|(at, row)| Measurement { time_s: 40.0 * at as f64, ..row }).collect();
+            let rows: Vec<&Measurement> = rows.iter().collect();
+            remember(&rows, &[0, 1, 2], &mut readings);
+            for joint in 0..readings[0].joints.len() {
+                let torque = readings[2].posture.torque(joint);
+                assert!(
+                    readings[2].torque_memory[joint].iter().all(|value| (value - torque).abs() < 1e-9 * torque.abs().max(1.0))
+                );
+            }
+        });
+    }
+}

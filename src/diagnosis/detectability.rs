@@ -108,3 +108,36 @@ fn why_nothing(kind: Kind) -> Reason {
         Reason::GeometryAbsorbs
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::tests::with_analysis;
+
+    /// Twice the noise hides twice as much, and what was not recorded shows nothing of any size.
+    #[test]
+    fn what_is_detectable_grows_with_the_noise_and_needs_what_its_kind_needs() {
+        with_analysis(
+            |_, _, _, _, _| 0.0,
+            |analysis| {
+                let (quiet, loud) = (detectability(&analysis, 1.0), detectability(&analysis, 4.0));
+                assert!(loud.share < quiet.share && quiet.share < 1.0);
+                let least = |of: &Detectability, kind: Kind, joint: usize| {
+                    let is = |known: Kind, place: &Place| known == kind && place.index == Some(joint);
+                    let seen = of.detectable.iter().filter(|one| is(one.kind, &one.location)).map(|one| &one.minimum_detectable);
+                    let hidden =
+                        of.undetectable.iter().filter(|one| is(one.kind, &one.location)).map(|one| &one.minimum_detectable);
+                    seen.chain(hidden).next().unwrap().value
+                };
+                for joint in [2, 3, 4] {
+                    let [a, b] = [&quiet, &loud].map(|of| least(of, Kind::Backlash, joint).unwrap());
+                    assert!((b / a - 2.0).abs() < 0.1, "joint {joint}: {a} {b}");
+                }
+                let without = quiet.undetectable.iter().filter(|one| one.reason == Reason::NoTemperatures);
+                let of_drift =
+                    without.filter(|one| one.kind == Kind::JointThermalDrift && one.minimum_detectable.value.is_none());
+                assert_eq!(of_drift.count(), 8);
+            },
+        );
+    }
+}

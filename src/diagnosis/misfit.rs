@@ -50,3 +50,51 @@ pub(super) fn doubt(evidence: &Evidence<'_>, mut found: Found) -> Found {
     }
     found
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::search::search;
+    use crate::diagnosis::tests::with_analysis;
+    use crate::effects::Kind;
+
+    /// The name that a joint's compliance gets where `unknown` acts in that joint or in the one after it: before and after the doubt.
+    fn doubted(size: f64, bump: f64, same: bool) -> [f64; 2] {
+        let mut probabilities = [0.0; 2];
+        with_analysis(
+            |arm, joints, _, of, payload| {
+                let torque = crate::diagnosis::tests::torque(arm, joints, 2, payload);
+                let unknown = bump * (-0.5 * ((joints[of] - 0.2) / 0.15).powi(2)).exp();
+                let yields = if of == 2 { size * torque } else { 0.0 };
+                yields + if of == (if same { 2 } else { 4 }) { unknown } else { 0.0 }
+            },
+            |analysis| {
+                let evidence = &analysis.evidence;
+                let found = search(evidence, &[], 6);
+                let of = |found: &Found| {
+                    let is = |belief: &&Belief| belief.claim.0 == Some(Kind::JointCompliance) && belief.claim.1.index == Some(3);
+                    found.claims.iter().find(is).map_or(0.0, |belief| belief.probability)
+                };
+                let unnamed = found.best.iter().any(|(member, _)| evidence.candidates.hypotheses[*member].kind.is_none());
+                assert_eq!(unnamed, bump > 0.0, "the unknown is to be seen");
+                probabilities[0] = of(&found);
+                probabilities[1] = of(&doubt(evidence, found));
+            },
+        );
+        probabilities
+    }
+
+    #[test]
+    fn a_name_is_doubted_by_as_much_as_the_unknown_in_its_joint_may_make() {
+        // Without anything unknown, and beside an unknown elsewhere, it stays as it is.
+        let [before, after] = doubted(2e-6, 0.0, true);
+        assert!(before > 0.5 && after == before, "{before} {after}");
+        let [before, after] = doubted(2e-6, 3e-3, false);
+        assert!(before > 0.5 && after == before, "{before} {after}");
+        // Beside a far larger one in the same joint a small cause loses, and a large one keeps its name.
+        let [before, after] = doubted(2e-6, 3e-3, true);
+        assert!(before > 0.5 && after < before, "{before} {after}");
+        let [before, after] = doubted(1e-4, 3e-3, true);
+        assert!(before > 0.9 && after > 0.9, "{before} {after}");
+    }
+}

@@ -106,3 +106,57 @@ fn misfit(mechanism: &Mechanism, joints: &[Vec<f64>], points: &[Vector3<f64>]) -
     }
     rms
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene;
+    use crate::seed::stream;
+
+    /// Readings of the shipped arm in a frame of their own, its target off the flange, after `change`.
+    fn said(change: impl Fn(&mut Measurement)) -> String {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/arm8.toml");
+        let arm = scene::read(path).unwrap().scene.arm;
+        let mut draws = stream(2, "test/mistake");
+        let mut pose = |size: f64| {
+            let mut three = || Vector3::from_fn(|_, _| draws.uniform(-size, size));
+            nalgebra::Isometry3::new(three(), three())
+        };
+        let (base, target) = (pose(1.0), pose(0.1));
+        let mut rows: Vec<Measurement> = (0..40)
+            .map(|index| {
+                let joints: Vec<f64> = arm.chain.joints.iter().map(|of| draws.uniform(of.lower, of.upper)).collect();
+                let position_m = (base * arm.chain.at_nominal().forward(&joints) * target).translation.vector.into();
+                Measurement { index, joints, position_m, ..Measurement::default() }
+            })
+            .collect();
+        rows.iter_mut().for_each(change);
+        hint(&arm, &rows.iter().collect::<Vec<_>>(), 0.5)
+    }
+
+    #[test]
+    fn each_mistake_is_told_by_its_name() {
+        assert!(
+            said(|row| row.position_m = row.position_m.map(|value| value * 1e-3)).contains("metres in columns that say mill")
+        );
+        assert!(
+            said(|row| row.position_m = row.position_m.map(|value| value * 1e3)).contains("millimetres in columns that say m")
+        );
+        let turned = |factor: f64| said(move |row| row.joints.iter_mut().for_each(|value| *value *= factor));
+        assert!(turned(180.0 / std::f64::consts::PI).contains("degrees in columns that say rad"));
+        assert!(turned(std::f64::consts::PI / 180.0).contains("rad in columns that say degrees"));
+        assert!(said(|row| row.joints[4] = -row.joints[4]).contains("joint 5 counted the other way round"));
+        assert!(said(|row| row.joints.swap(2, 5)).contains("columns of joints 3 and 6 were swapped"));
+    }
+
+    /// Where none of them explains it, none is said, but a joint of which the readings stand still is.
+    #[test]
+    fn nothing_is_blamed_that_explains_little() {
+        let mut draws = stream(3, "test/mistake/noise");
+        let noise: Vec<[f64; 3]> = (0..40).map(|_| [0; 3].map(|_| draws.uniform(-1.0, 1.0))).collect();
+        assert!(said(|row| row.position_m = noise[row.index]).contains("is it this robot"));
+        assert!(
+            said(|row| (row.position_m, row.joints[3]) = (noise[row.index], 0.3)).contains("readings of joint 4 never change")
+        );
+    }
+}

@@ -115,3 +115,64 @@ fn doing_without(held_out: &HeldOut) -> Option<Note> {
     let count = held_out.folds.iter().filter(|fold| fold.used < fold.chosen.len()).count();
     (count > 0).then_some(Note::FoldsDoWithout { by: held_out.by, count, folds: held_out.folds.len() })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::held_out::Block;
+    use crate::diagnosis::tests::{fold_of, with_analysis};
+    use crate::measurement::Measurement;
+
+    #[test]
+    fn values_are_on_a_step_up_to_the_decimals_of_a_table() {
+        let degrees = [12.3_f64, -0.7, 90.0].map(f64::to_radians);
+        assert!(is_on(Step::Degrees(0.1), &degrees) && !is_on(Step::Degrees(1.0), &degrees));
+        let written = degrees.map(|value| (value * 1e12).round() / 1e12);
+        assert!(is_on(Step::Degrees(0.1), &written) && !is_on(Step::Radians(0.001), &written));
+    }
+
+    #[test]
+    fn folds_that_use_less_than_was_chosen_are_counted() {
+        let fold = |used: usize| crate::diagnosis::held_out::Fold { used, ..fold_of([9.0, 4.0, 1.0], &[], vec![3, 5]) };
+        let held_out = |used: [usize; 3]| HeldOut { by: Block::Payload, folds: used.map(fold).into() };
+        assert_eq!(doing_without(&held_out([2, 2, 2])), None);
+        assert_eq!(doing_without(&held_out([2, 0, 1])), Some(Note::FoldsDoWithout { by: Block::Payload, count: 2, folds: 3 }));
+    }
+
+    /// A joint that was written to a tenth of a degree: evenly spread over a step, times its lever.
+    #[test]
+    fn rounding_is_told_with_the_error_that_it_makes() {
+        with_analysis(
+            |_, _, _, _, _| 0.0,
+            |mut analysis| {
+                let rounded = |row: &&Measurement| {
+                    let mut row = (*row).clone();
+                    row.joints[1] = ((row.joints[1].to_degrees() * 10.0).round() / 10.0).to_radians();
+                    row
+                };
+                // As long as the analysis, which borrows them.
+                let rows: &'static [Measurement] = analysis.measurements.iter().map(rounded).collect::<Vec<_>>().leak();
+                analysis.measurements = rows.iter().collect::<Vec<_>>().leak();
+                analysis.residuals.iter_mut().for_each(|left| left.before_m = [5e-3; 3]);
+                let found = rounding(&analysis);
+                let [Note::Rounded { joints, step, rms_m }] = found.as_slice() else {
+                    panic!("{found:?}");
+                };
+                assert_eq!((joints.as_slice(), *step), (&[2][..], Step::Degrees(0.1)));
+                let mechanism = &analysis.linear.rows.mechanism;
+                let lever = |row: &Measurement| {
+                    let turned = |by: f64| {
+                        let mut joints = row.joints.clone();
+                        joints[1] += by;
+                        mechanism.posture(&joints, 0.0).tool
+                    };
+                    (turned(1e-6) - turned(-1e-6)).norm() / 2e-6
+                };
+                let square = rows.iter().map(|row| lever(row).powi(2)).sum::<f64>() / rows.len() as f64;
+                let wanted = 0.1_f64.to_radians() * (square / 12.0).sqrt();
+                // The target is off the tool by as much as the fit says.
+                assert!((rms_m / wanted - 1.0).abs() < 0.01, "{rms_m} against {wanted}");
+            },
+        );
+    }
+}

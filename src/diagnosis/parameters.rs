@@ -32,3 +32,36 @@ pub(crate) fn named(signature: &Signature, after: impl Fn(usize) -> f64) -> Para
     let said = signature.shape.parameters(Coefficients(&signature.coefficients));
     Parameters { after: said.row.map(after), ..said }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::diagnosis::tests::with_analysis;
+    use crate::effects::Kind;
+    use crate::effects::kind::joint_eccentricity::Harmonic;
+    use crate::effects::signature::shape::Shape;
+
+    /// The coefficients are those of the wave that was put in, in its own unit, whatever the units in which it is looked for.
+    #[test]
+    fn the_signature_of_a_wave_has_its_amplitude_and_phase() {
+        let (amplitude, phase) = (4e-4, 0.7_f64);
+        with_analysis(
+            |_, joints, _, of, _| if of == 2 { amplitude * (joints[of] + phase).sin() } else { 0.0 },
+            |analysis| {
+                let shape = Shape::Harmonic(Harmonic { joint: 2, order: 1.0 });
+                let hypotheses = &analysis.evidence.candidates.hypotheses;
+                let number = hypotheses
+                    .iter()
+                    .position(|of| of.kind == Some(Kind::JointEccentricity) && of.shape == shape)
+                    .expect("once per turn of joint 3");
+                let fit = analysis.evidence.fit(&[(number, crate::diagnosis::settings::SCALES - 1)]).unwrap();
+                let found = super::signature(&analysis, &fit, number);
+                assert_eq!(found.shape, shape);
+                let [cosine, sine] = found.coefficients[..] else {
+                    panic!("{found:?}");
+                };
+                assert!((cosine - amplitude * phase.sin()).abs() < 0.1 * amplitude, "{cosine}");
+                assert!((sine - amplitude * phase.cos()).abs() < 0.1 * amplitude, "{sine}");
+            },
+        );
+    }
+}

@@ -127,3 +127,71 @@ pub(super) fn scan(
     found.truncate(settings.most);
     found
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::tests::with_analysis;
+    use crate::seed::stream;
+
+    #[test]
+    fn a_multiple_that_is_turned_to_is_the_one_that_is_computed() {
+        let mut draws = stream(1, "test/turning");
+        let angles: Vec<f64> = (0..40).map(|_| draws.uniform(-4.0, 4.0)).collect();
+        let (first, last) = (*RIPPLES.start(), *RIPPLES.end());
+        let mut turning = Turning::new(angles.iter().copied(), first);
+        let mut wave = DMatrix::zeros(angles.len(), 2);
+        for multiple in first..=last {
+            turning.next(&mut wave);
+            for (row, angle) in angles.iter().enumerate() {
+                let (sine, cosine) = (f64::from(multiple) * angle).sin_cos();
+                assert!(
+                    (wave[(row, 0)] - cosine).abs() < 1e-11 && (wave[(row, 1)] - sine).abs() < 1e-11,
+                    "{multiple} of {angle}"
+                );
+            }
+        }
+    }
+
+    /// The drop is that of the least squares of the readings by geometry (with its prior) and the two waves, made in one piece.
+    #[test]
+    fn a_ripple_is_found_with_the_drop_of_the_dense_least_squares() {
+        let (joint, waves) = (2, 37_u16);
+        with_analysis(
+            |_, joints, _, of, _| if of == joint { 2e-4 * (f64::from(waves) * joints[of] + 0.4).sin() } else { 0.0 },
+            |analysis| {
+                let linear = analysis.linear;
+                let settings = &analysis.options.settings.ripple;
+                let found = scan(linear, &linear.residual, 1.0, &|_| true, settings);
+                assert_eq!((found[0].joint, found[0].waves), (joint, waves));
+                let jacobian = linear.rows.whitening.of(&linear.rows.jacobian);
+                let (height, width) = jacobian.shape();
+                let left = |more: &DMatrix<f64>| -> f64 {
+                    let columns = width + more.ncols();
+                    let mut matrix = DMatrix::zeros(height + width, columns);
+                    matrix.view_mut((0, 0), (height, width)).copy_from(&jacobian);
+                    matrix.view_mut((0, width), (height, more.ncols())).copy_from(more);
+                    matrix.view_mut((height, 0), (width, width)).fill_with_identity();
+                    let mut right = DVector::zeros(height + width);
+                    right.rows_mut(0, height).copy_from(&linear.in_sigmas(&linear.residual));
+                    // The prior holds the whole geometry, not its change.
+                    right.rows_mut(height, width).copy_from(&-&linear.rows.parameters);
+                    let on_columns = matrix.qr().q().tr_mul(&right);
+                    right.norm_squared() - on_columns.norm_squared()
+                };
+                let mut wave = DMatrix::zeros(linear.rows.residual.len(), 2);
+                for (row, reading) in linear.readings.iter().enumerate() {
+                    let (sine, cosine) = (f64::from(waves) * reading.joints[joint]).sin_cos();
+                    for (equation, moved) in linear.rows.equations.of(row).zip(linear.rows.moved(row, joint).iter()) {
+                        wave[(equation, 0)] = moved * cosine;
+                        wave[(equation, 1)] = moved * sine;
+                    }
+                }
+                let drop = left(&DMatrix::zeros(height, 0)) - left(&linear.rows.whitening.of(&wave));
+                assert!((found[0].drop / drop - 1.0).abs() < 1e-6, "{} against {drop}", found[0].drop);
+                // Rows that do not count are not looked at.
+                assert!(scan(linear, &linear.residual, 1.0, &|_| false, settings).is_empty());
+            },
+        );
+    }
+}

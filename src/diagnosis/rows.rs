@@ -235,3 +235,46 @@ fn of_geometry(arm: &Arm, measurements: &[&Measurement], fitted: geometry::Geome
         notes: fitted.notes,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::settings::Settings;
+    use crate::diagnosis::tests::{readings, sensor};
+    use crate::seed::stream;
+
+    #[test]
+    fn a_displacement_is_read_in_measurement_and_found_again_in_root() {
+        let (arm, rows) = readings("test/rows", |_, _, _, _, _| 0.0);
+        let rows: Vec<&Measurement> = rows.iter().collect();
+        let sensor = Sensor { orientation_sigma_rad: Some(2e-5), ..sensor() };
+        let weights = vec![1.0; rows.len()];
+        let fitted =
+            fit(&arm, Readings { sensor: &sensor, measurements: &rows, weights: &weights, displacement: &[], scatter: &[] })
+                .unwrap();
+        let mut draws = stream(6, "test/rows");
+        let moved: Vec<Displacement> = rows.iter().map(|_| std::array::from_fn(|_| draws.normal())).collect();
+        let read: Vec<f64> =
+            moved.iter().enumerate().flat_map(|(row, moved)| fitted.read(row, moved).collect::<Vec<_>>()).collect();
+        let read = DVector::from_vec(read);
+        for (row, moved) in moved.iter().enumerate() {
+            let found = fitted.displacement(row, &read);
+            assert!(found.iter().zip(moved).all(|(a, b)| (a - b).abs() < 1e-12));
+            // A turn of the frame keeps lengths.
+            let length = |of: &[f64]| of[..3].iter().map(|value| value * value).sum::<f64>();
+            assert!((length(&fitted.in_measurement(row, &read)) - length(moved)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn another_unit_is_no_arm_of_this_kind_and_a_few_wild_readings_are() {
+        let settings = &Settings::default().model;
+        let (arm, mut rows) = readings("test/robot", |_, _, _, _, _| 0.0);
+        let check = |rows: &[Measurement]| check_robot(&arm, &sensor(), &rows.iter().collect::<Vec<_>>(), settings);
+        rows[7].position_m[0] += 3.0;
+        rows[30].position_m[2] -= 5.0;
+        assert!(check(&rows).is_ok());
+        rows.iter_mut().for_each(|row| row.position_m = row.position_m.map(|value| 1e3 * value));
+        assert!(matches!(check(&rows), Err(DiagnosisError::NotThisRobot { .. } | DiagnosisError::NotThisGeometry { .. })));
+    }
+}

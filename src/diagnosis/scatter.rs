@@ -224,3 +224,46 @@ impl<'a> Left<'a> {
         sum / libm::sqrt(variance).max(1e-12)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::tests::with_analysis;
+
+    /// A number between -1 and 1 that is in no order of `value`.
+    fn without_order(value: f64) -> f64 {
+        (1e7 * value).sin()
+    }
+
+    fn looked(off: impl Fn(f64, usize) -> f64) -> Vec<Scatter> {
+        let mut found = Vec::new();
+        with_analysis(
+            |_, joints, _, of, _| off(joints[of], of),
+            |analysis| found = look(analysis.linear, &analysis.evidence, &Found::default(), false),
+        );
+        found
+    }
+
+    #[test]
+    fn a_joint_that_does_not_repeat_is_found_with_its_sigma() {
+        let found = looked(|angle, of| if of == 3 { 1e-4 * without_order(angle) } else { 0.0 });
+        assert_eq!(found.iter().map(|one| one.joint).collect::<Vec<_>>(), [3]);
+        // Root mean square of a sine; geometry has taken its part, and steps of the sigma are of a factor 1.4.
+        let ratio = found[0].sigma / (1e-4 / 2_f64.sqrt());
+        assert!((0.6..1.5).contains(&ratio) && found[0].log_odds > 5.0, "{:?}", found[0]);
+    }
+
+    #[test]
+    fn an_arm_that_repeats_has_none() {
+        assert_eq!(looked(|_, _| 0.0), []);
+    }
+
+    #[test]
+    fn scatter_is_alike_by_joint_and_size() {
+        let settings = crate::diagnosis::settings::Settings::default().scatter;
+        let of = |joint: usize, sigma: f64| Scatter { joint, sigma, log_odds: 0.0 };
+        assert!(alike(&[of(1, 1e-3), of(4, 2e-3)], &[of(4, 2e-3), of(1, 1.001e-3)], &settings));
+        assert!(!alike(&[of(1, 1e-3)], &[of(2, 1e-3)], &settings) && !alike(&[of(1, 1e-3)], &[of(1, 9e-3)], &settings));
+        assert!(!alike(&[of(1, 1e-3)], &[], &settings));
+    }
+}

@@ -213,3 +213,105 @@ fn in_order(evidence: &Evidence<'_>, members: &[(usize, usize)]) -> Vec<usize> {
     }
     ordered
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::*;
+    use crate::diagnosis::evidence::{Candidates, NoisePrior};
+    use crate::diagnosis::products::test_marginal;
+    use crate::diagnosis::settings::{SCALES, Settings};
+    use crate::effects::Level;
+    use crate::effects::kind::joint_compliance::Torque;
+    use crate::effects::signature::library::Hypothesis;
+    use crate::effects::signature::shape::Shape;
+    use crate::seed::Stream;
+
+    /// Joints that yield, one column each.
+    fn candidates(count: usize) -> Candidates {
+        let of = |joint: usize| Hypothesis {
+            share: None,
+            kind: Some(Kind::JointCompliance),
+            location: Location { level: Level::Joint, index: Some(joint + 1) },
+            shape: Shape::Torque(Torque { joint }),
+            range: [0.5, 2.0],
+            spread: vec![1.0],
+            detail: String::new(),
+        };
+        Candidates {
+            hypotheses: (0..count).map(of).collect(),
+            first: (0..count).collect(),
+            unit: vec![1.0; count],
+            log_odds: vec![-2.0; count],
+            active: vec![true; count],
+            scanned: count,
+        }
+    }
+
+    fn with_evidence(signatures: &DMatrix<f64>, residual: &DVector<f64>, ask: impl FnOnce(&Evidence<'_>)) {
+        let candidates = candidates(signatures.ncols());
+        let products = test_marginal(&candidates, signatures, residual);
+        let (marginal, settings) = (products.marginal(), Settings::default());
+        let noise = NoisePrior { degrees_of_freedom: 100.0, level: 1.0 };
+        ask(&Evidence { marginal: &marginal, candidates: &candidates, noise, settings: &settings });
+    }
+
+    /// Every set of the hypotheses from `first` on, with every scale.
+    fn all_sets(first: usize, count: usize) -> Vec<Vec<(usize, usize)>> {
+        if first == count {
+            return vec![Vec::new()];
+        }
+        let rest = all_sets(first + 1, count);
+        let with = |scale: usize| rest.iter().map(move |set| [&[(first, scale)], set.as_slice()].concat());
+        (0..SCALES).flat_map(with).chain(rest.iter().cloned()).collect()
+    }
+
+    fn design(rows: usize, columns: usize, draws: &mut Stream) -> DMatrix<f64> {
+        DMatrix::from_fn(rows, columns, |_, _| draws.normal())
+    }
+
+    #[test]
+    fn the_climb_ends_at_the_likeliest_of_all_sets() {
+        let mut draws = stream(9, "test/climb");
+        for round in 0..12 {
+            let mut signatures = design(40, 4, &mut draws);
+            // Two of them look much alike.
+            let other = signatures.column(0) * 0.8 + signatures.column(3) * 0.6;
+            signatures.set_column(3, &other);
+            let truth = DVector::from_fn(4, |at, _| if (round >> at) % 2 == 1 { 1.0 } else { 0.0 });
+            let residual = &signatures * truth + DVector::from_fn(40, |_, _| draws.normal());
+            with_evidence(&signatures, &residual, |evidence| {
+                let (members, value) = climb(evidence, &[], 4);
+                let best = all_sets(0, 4).iter().map(|set| evidence.log_posterior(set)).fold(f64::NEG_INFINITY, f64::max);
+                assert!((value - evidence.log_posterior(&members)).abs() < 1e-9 && (value - best).abs() < 1e-9, "{value} {best}");
+            });
+        }
+    }
+
+    /// Which of two that look alike it is, by adding up all sets.
+    #[test]
+    fn alternatives_share_their_probability_as_all_sets_say() {
+        let mut draws = stream(10, "test/alternatives");
+        let mut signatures = design(40, 3, &mut draws);
+        let other = signatures.column(0) + signatures.column(1) * 0.1;
+        signatures.set_column(1, &other);
+        let residual = signatures.column(0) * 1.5 + DVector::from_fn(40, |_, _| draws.normal());
+        with_evidence(&signatures, &residual, |evidence| {
+            let sets = all_sets(0, 3);
+            let top = sets.iter().map(|set| evidence.log_posterior(set)).fold(f64::NEG_INFINITY, f64::max);
+            let weight = |number: usize| -> f64 {
+                let only = |set: &&Vec<(usize, usize)>| set.len() == 1 && set[0].0 == number;
+                sets.iter().filter(only).map(|set| (evidence.log_posterior(set) - top).exp()).sum()
+            };
+            let wanted = weight(0) / (weight(0) + weight(1));
+            let found = search(evidence, &[], 3);
+            let of = |number: usize| {
+                let is = |belief: &&Belief| belief.claim.1.index == Some(number + 1);
+                found.causes[0].iter().find(is).map_or(0.0, |belief| belief.probability)
+            };
+            assert!((0.02..0.98).contains(&wanted), "{wanted}");
+            assert!((of(0) / (of(0) + of(1)) - wanted).abs() < 0.05, "{} {} {wanted}", of(0), of(1));
+        });
+    }
+}

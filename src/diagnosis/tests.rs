@@ -50,7 +50,7 @@ fn energy(arm: &Arm, joints: &[f64], payload_kg: f64) -> f64 {
     -arm.gravity_in_base.dot(&moment)
 }
 
-fn torque(arm: &Arm, joints: &[f64], joint: usize, payload_kg: f64) -> f64 {
+pub(crate) fn torque(arm: &Arm, joints: &[f64], joint: usize, payload_kg: f64) -> f64 {
     let at = |shift: f64| {
         let mut moved = joints.to_vec();
         moved[joint] += shift;

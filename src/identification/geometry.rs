@@ -749,6 +749,74 @@ mod tests {
         assert!((after.residual - before.residual).amax() < 1e-8);
     }
 
+    /// The marginal likelihood over that at another scale is the one of the dense covariance of the readings, the noise's size integrated
+    /// out: `|V|^(-1/2) (r' V^-1 r)^(-n/2)` with `V = I + scale^2 J J'`.
+    #[test]
+    fn scales_are_compared_by_the_likelihood_of_the_dense_covariance() {
+        let mut stream = stream(3, "test/scales");
+        let (rows, columns) = (14, 5);
+        let jacobian = DMatrix::from_fn(rows, columns, |_, _| 3.0 * stream.normal());
+        let read = DVector::from_fn(rows, |_, _| 2.0 * stream.normal());
+        let parameters = DVector::from_fn(columns, |_, _| stream.normal());
+        // About a fit that is somewhere: the readings are the residual and what the fitted parameters do.
+        let residual = &read - &jacobian * &parameters;
+        let placed = Placed {
+            measurement_from_root: Vec::new(),
+            tool_from_target: Vec::new(),
+            parameters,
+            before: 0,
+            count: columns,
+            scale: 1.0,
+        };
+        let ours = |scale: f64| {
+            let with_residual = jacobian.transpose() * DMatrix::from_column_slice(rows, 1, residual.as_slice());
+            let normal = jacobian.transpose() * &jacobian;
+            likelihood(&normal, &with_residual, residual.norm_squared(), rows, &placed, &vec![false; columns], scale)
+        };
+        let dense = |scale: f64| {
+            let covariance = DMatrix::identity(rows, rows) + &jacobian * jacobian.transpose() * (scale * scale);
+            let square = read.dot(&(covariance.clone().try_inverse().unwrap() * &read));
+            -0.5 * covariance.determinant().ln() - 0.5 * rows as f64 * square.ln()
+        };
+        for scale in [3.0, 0.3, 0.03, 1e-3] {
+            let (found, wanted) = (ours(scale) - ours(1.0), dense(scale) - dense(1.0));
+            assert!((found - wanted).abs() < 1e-9 * wanted.abs().max(1.0), "{scale}: {found} against {wanted}");
+        }
+    }
+
+    /// Few readings by a camera leave an arm that is nominal so, which priors of manufacturing do not; and errors of the size of
+    /// those are found where the sensor sees them.
+    #[test]
+    fn an_arm_is_kept_as_near_to_nominal_as_the_readings_speak_for() {
+        let mut stream = stream(4, "test/shrunk");
+        let camera = Sensor { position_sigma_m: 1e-3, orientation_sigma_rad: Some(1e-3), ..sensor(true) };
+        let (mut loose_m, mut shrunk_m, mut nominal_m) = (0.0, 0.0, 0.0);
+        for _ in 0..6 {
+            let arm = arm(6, &mut stream);
+            let mut rows = readings(&arm, 60, 1, 0.0, 0.0, &mut stream);
+            let others = rows.split_off(15);
+            for row in &mut rows {
+                row.position_m = (Vector3::from(row.position_m) + Vector3::from_fn(|_, _| 1e-3 * stream.normal())).into();
+                let turn = rotation_from_vector(&Vector3::from_fn(|_, _| 1e-3 * stream.normal()));
+                row.orientation_xyzw = row.orientation().map(|orientation| (turn * orientation).coords.into());
+            }
+            let fitted: Vec<&Measurement> = rows.iter().collect();
+            let of = Readings { sensor: &camera, measurements: &fitted, weights: &[1.0; 15], displacement: &[], scatter: &[] };
+            let square = |found: &Geometry| -> f64 {
+                others.iter().map(|row| difference(row, &found.predict(row)).fixed_rows::<3>(0).norm_squared()).sum()
+            };
+            loose_m += square(&fit(&arm, of).unwrap());
+            shrunk_m += square(&fit_shrunk(&arm, of).unwrap());
+            nominal_m += square(&fit_at(&arm, of, 1e-6).unwrap());
+        }
+        assert!(shrunk_m < 1.1 * nominal_m && loose_m > 2.0 * nominal_m, "{loose_m} {shrunk_m} {nominal_m}");
+        let arm = arm(6, &mut stream);
+        let rows = readings(&arm, 80, 1, 0.3, 2e-5, &mut stream);
+        let fitted: Vec<&Measurement> = rows.iter().collect();
+        let of = Readings { sensor: &sensor(true), measurements: &fitted, weights: &[1.0; 80], displacement: &[], scatter: &[] };
+        assert_eq!(fit(&arm, of).unwrap().likeliest_scale(), 0.3);
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
 
@@ -756,7 +824,7 @@ mod tests {
         #[test]
         fn no_step_of_a_geometry_raises_the_cost(
             seed in 0u64..1_000_000, joints in 2usize..8, count in 8usize..24, wrong in 0.0..20.0f64, noise in 0.0..0.3f64,
-            orientation: bool, sessions in 1usize..3, away in 0.0..1.5f64,
+            orientation: bool, sessions in 1usize..3, away in 0.0..1.5f64, scale in 0.003..3.0f64,
         ) {
             let mut stream = stream(seed, "test/geometry/descent");
             let arm = arm(joints, &mut stream);
@@ -774,7 +842,7 @@ mod tests {
                 displacement: &[],
                 scatter: &[],
             };
-            let problem = Placing::new(&arm, of, &session, sessions).unwrap();
+            let problem = Placing::new(&arm, of, &session, sessions, scale).unwrap();
             let all: Vec<usize> = (0..problem.free.len()).collect();
             let start = problem.start(&arm).unwrap();
             let step = DVector::from_fn(all.len(), |_, _| away * stream.normal());
