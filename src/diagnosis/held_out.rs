@@ -226,11 +226,7 @@ impl Validation<'_> {
                 Some(Fold { name: scheme.names[number].clone(), ..fold })
             })
             .collect();
-        let used: Vec<usize> = (0..folds.len()).map(|number| used(&folds, number, &self.settings.validation)).collect();
-        for (fold, used) in folds.iter_mut().zip(used) {
-            fold.used = used;
-            fold.explained = fold.with_first_chosen(used);
-        }
+        use_what_helps(&mut folds, &self.settings.validation);
         HeldOut { by: scheme.by, folds }
     }
 
@@ -306,6 +302,20 @@ impl Validation<'_> {
     }
 }
 
+/// Decides what each fold uses of what was chosen for it ([`used`]). Where all of that together predicts worse than geometry alone, it
+/// is no model of these readings, and no fold uses any.
+fn use_what_helps(folds: &mut [Fold], settings: &settings::Validation) {
+    let counts: Vec<usize> = (0..folds.len()).map(|number| used(folds, number, settings)).collect();
+    let of_all = |count: &dyn Fn(usize) -> usize| -> f64 {
+        folds.iter().enumerate().map(|(number, fold)| fold.with_first_chosen(count(number))).sum()
+    };
+    let helps = of_all(&|number| counts[number]) <= of_all(&|_| 0);
+    for (fold, count) in folds.iter_mut().zip(counts) {
+        fold.used = if helps { count } else { 0 };
+        fold.explained = fold.with_first_chosen(fold.used);
+    }
+}
+
 /// How many of the effects chosen for fold `number` are used, by what as many of theirs did to the other folds: the most with which
 /// those were predicted no worse than by geometry alone, in the mean of the logarithms of how much less is left. No fold's gain counts
 /// for more than [`settings::Validation::largest_gain`], and no loss for more than `largest_loss`: one that goes wild outvotes others, and others do not outvote it. All of them where fewer than two other folds can tell.
@@ -326,4 +336,29 @@ pub(super) fn used(folds: &[Fold], number: usize, settings: &settings::Validatio
         logs.iter().sum::<f64>() <= 0.0
     };
     (1..=chosen).rev().find(no_worse).unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::settings::Settings;
+    use crate::diagnosis::tests::fold_of;
+
+    fn folds(with_chosen: [f64; 5]) -> Vec<Fold> {
+        with_chosen.map(|left| Fold { used: 0, ..fold_of([9.0, 4.0, left], &[], vec![7]) }).into()
+    }
+
+    /// What helps elsewhere is used, and of what helps most folds but spoils one so much that geometry alone is better nothing is.
+    #[test]
+    fn what_predicts_worse_than_geometry_is_never_reported() {
+        let settings = &Settings::default().validation;
+        let mut helped = folds([1.0, 1.0, 2.0, 1.0, 4.5]);
+        use_what_helps(&mut helped, settings);
+        assert!(helped.iter().all(|fold| fold.used == 1));
+        assert_eq!(helped.iter().map(|fold| fold.explained).sum::<f64>(), 9.5);
+        let mut wild = folds([1.0, 1.0, 2.0, 1.0, 90.0]);
+        assert_eq!(used(&wild, 4, settings), 1, "the others, which cannot know, are for it");
+        use_what_helps(&mut wild, settings);
+        assert!(wild.iter().all(|fold| fold.used == 0 && fold.explained == fold.geometry));
+    }
 }

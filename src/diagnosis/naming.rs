@@ -31,6 +31,11 @@ pub(super) fn name(analysis: &Analysis<'_>, closing: &Closing<'_>, unknown: bool
         else {
             continue;
         };
+        let magnitude = magnitude(analysis, fit, *hypothesis);
+        // What may be nothing has no name, however well its place is filled by something.
+        if magnitude.ci95[0] <= 0.0 && magnitude.ci95[1] >= 0.0 {
+            continue;
+        }
         let chosen = folds.iter().filter(|fold| fold.chosen.iter().any(|other| claim(analysis, *other) == this)).count();
         let (before, now) = (closing.after(step), closing.after(step + 1));
         of_member[step] = Some(effects.len());
@@ -39,7 +44,7 @@ pub(super) fn name(analysis: &Analysis<'_>, closing: &Closing<'_>, unknown: bool
             kind,
             location: place(analysis, *hypothesis),
             probability,
-            magnitude: magnitude(analysis, fit, *hypothesis),
+            magnitude,
             parameters: parameters(analysis, &signature),
             signature: Some(signature),
             held_out_rms_before_m: before,
