@@ -19,9 +19,11 @@ pub(super) fn candidates(mut hypotheses: Vec<Hypothesis>, scanned: Vec<Hypothesi
         first.push(columns);
         columns += hypothesis.spread.len();
     }
-    let unit = hypotheses.iter().map(|hypothesis| libm::sqrt(hypothesis.range[0] * hypothesis.range[1])).collect();
+    let unit: Vec<f64> = hypotheses.iter().map(|hypothesis| libm::sqrt(hypothesis.range[0] * hypothesis.range[1])).collect();
+    let most = |of: &Hypothesis| of.kind.map_or(f64::INFINITY, |kind| kind.descriptor().most);
+    let widest = hypotheses.iter().zip(&unit).map(|(of, unit)| most(of) * of.range[1] / unit).collect();
     let count = hypotheses.len();
-    Candidates { hypotheses, first, unit, log_odds: vec![0.0; count], active: vec![true; count], scanned: from }
+    Candidates { hypotheses, first, unit, widest, log_odds: vec![0.0; count], active: vec![true; count], scanned: from }
 }
 
 /// A class of hypotheses that share one prior: a kind, or a family of shapes without a name.
@@ -105,6 +107,17 @@ mod tests {
         let of = candidates([2, 1, 3].map(|width| hypothesis(None, 1, None, width)).to_vec(), Vec::new());
         assert_eq!((0..3).map(|number| of.columns(number)).collect::<Vec<_>>(), [0..2, 2..3, 3..6]);
         assert_eq!(of.unit, [1.0; 3]);
+    }
+
+    /// Links of plastic, warmed: nothing grows more, whatever the readings would like.
+    #[test]
+    fn no_prior_is_wider_than_the_worst_of_arms() {
+        let prior = Settings::default().prior;
+        let of = candidates([Some(Kind::LinkThermalGrowth), None].map(|kind| hypothesis(kind, 1, None, 1)).to_vec(), Vec::new());
+        let widest = crate::diagnosis::settings::SCALES - 1;
+        // The upper end of the range is two units, and plastics grow five times as much.
+        assert_eq!([0, 1].map(|number| of.size(&prior, number, widest)), [10.0, prior.scales[widest]]);
+        assert_eq!(of.size(&prior, 0, 0), prior.scales[0]);
     }
 
     /// The prior as a tree, leaf by leaf: a quarter of it for shapes without a name; kinds, then places, then variants alike.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::products::Marginal;
-use super::settings::{SCALES, Settings};
+use super::settings::{Prior, SCALES, Settings};
 use crate::effects::signature::library::Hypothesis;
 
 /// What is known of the noise beforehand: so many readings' worth (degrees of freedom) of a mean square, in declared sigmas.
@@ -28,6 +28,8 @@ pub(crate) struct Candidates {
     pub(crate) first: Vec<usize>,
     /// Magnitude that a coefficient of one stands for.
     pub(crate) unit: Vec<f64>,
+    /// Largest standard deviation that a prior of its coefficients may have: no arm has more of it.
+    pub(crate) widest: Vec<f64>,
     /// Logarithm of the prior odds of having it over not.
     pub(crate) log_odds: Vec<f64>,
     /// Whether it is in play.
@@ -60,6 +62,12 @@ impl Candidates {
     #[must_use]
     pub(crate) fn columns(&self, hypothesis: usize) -> std::ops::Range<usize> {
         self.first[hypothesis]..self.first[hypothesis] + self.hypotheses[hypothesis].spread.len()
+    }
+
+    /// Standard deviation of the prior number `scale` of a hypothesis' coefficients.
+    #[must_use]
+    pub(crate) fn size(&self, prior: &Prior, hypothesis: usize, scale: usize) -> f64 {
+        prior.scales[scale].min(self.widest[hypothesis])
     }
 
     /// Whether both cannot be in one model: they are the same thing.
@@ -123,7 +131,12 @@ pub struct Extension {
 
 impl<'a> Evidence<'a> {
     fn solve(&self, members: &[(usize, usize)]) -> Option<Solved> {
-        self.solve_sized(members.iter().map(|(hypothesis, scale)| (*hypothesis, self.settings.prior.scales[*scale])))
+        self.solve_sized(self.sized(members))
+    }
+
+    /// `members`, each with the standard deviation of its coefficients' prior.
+    fn sized(&self, members: &[(usize, usize)]) -> impl Iterator<Item = (usize, f64)> {
+        members.iter().map(|(hypothesis, scale)| (*hypothesis, self.candidates.size(&self.settings.prior, *hypothesis, *scale)))
     }
 
     /// `members`: hypotheses, each with the standard deviation of its coefficients over the noise's.
@@ -202,10 +215,9 @@ impl<'a> Evidence<'a> {
     /// Logarithm of the evidence of `others` with `hypothesis` over that of `others` alone, where its coefficients have the standard
     /// deviation `size`; without any prior of it being there.
     pub(super) fn log_gain(&self, others: &[(usize, usize)], hypothesis: usize, size: f64) -> f64 {
-        let sized = || others.iter().map(|(hypothesis, scale)| (*hypothesis, self.settings.prior.scales[*scale]));
         let ratio =
             |model: Option<Solved>| model.map_or(f64::NEG_INFINITY, |model| self.log_ratio(model.drop, model.log_determinant));
-        ratio(self.solve_sized(sized().chain([(hypothesis, size)]))) - ratio(self.solve_sized(sized()))
+        ratio(self.solve_sized(self.sized(others).chain([(hypothesis, size)]))) - ratio(self.solve(others))
     }
 
     /// What survives of the geometry of what `those` of `members` do together, as a sum of squares in sigmas of the noise that
@@ -320,7 +332,8 @@ impl<'a> Evidence<'a> {
             };
             if width == 1 {
                 let (left, right) = (marginal.own(hypothesis, 0, 0) - product(0, 0), right(0));
-                for (scale, size) in self.settings.prior.scales.iter().enumerate() {
+                for scale in 0..SCALES {
+                    let size = candidates.size(&self.settings.prior, hypothesis, scale);
                     let precision = 1.0 / (size * size);
                     let diagonal = left + precision;
                     let coefficient = right / diagonal;
@@ -330,7 +343,8 @@ impl<'a> Evidence<'a> {
             }
             let left = DMatrix::from_fn(width, width, |i, j| marginal.own(hypothesis, i, j) - product(i, j));
             let right = DVector::from_fn(width, |i, _| right(i));
-            for (scale, size) in self.settings.prior.scales.iter().enumerate() {
+            for scale in 0..SCALES {
+                let size = candidates.size(&self.settings.prior, hypothesis, scale);
                 let precision = 1.0 / (size * size);
                 let mut matrix = left.clone();
                 for i in 0..width {
@@ -399,6 +413,7 @@ mod tests {
             hypotheses: vec![of],
             first: vec![0],
             unit: vec![1.0],
+            widest: vec![f64::INFINITY],
             log_odds: vec![-1.0],
             active: vec![true],
             scanned: 1,

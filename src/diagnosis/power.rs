@@ -267,9 +267,8 @@ impl<'a> Bench<'a> {
         let fitted: Vec<(usize, f64)> = beside
             .iter()
             .flat_map(|(member, scale)| {
-                self.candidates
-                    .columns(*member)
-                    .map(|column| (column, 1.0 / (self.settings.prior.scales[*scale] * self.settings.prior.scales[*scale])))
+                let size = self.candidates.size(&self.settings.prior, *member, *scale);
+                self.candidates.columns(*member).map(move |column| (column, 1.0 / (size * size)))
             })
             .collect();
         if !fitted.is_empty() {
@@ -296,7 +295,8 @@ impl<'a> Bench<'a> {
             axes.view_mut((first, first), (width, width)).copy_from(&vectors);
             let log_odds = self.candidates.log_odds[hypothesis];
             let mut constant = [if log_odds.is_finite() { log_odds } else { OUT_OF_PLAY }; SCALES];
-            for (scale, (size, share)) in self.settings.prior.scales.iter().zip(&self.settings.prior.scale_shares).enumerate() {
+            for (scale, share) in self.settings.prior.scale_shares.iter().enumerate() {
+                let size = self.candidates.size(&self.settings.prior, hypothesis, scale);
                 constant[scale] += libm::log(*share);
                 for (i, value) in values.iter().enumerate() {
                     inverse[first + i][scale] = 1.0 / (value + 1.0 / (size * size));
@@ -552,6 +552,7 @@ mod tests {
             hypotheses,
             first,
             unit: vec![0.8; count],
+            widest: vec![f64::INFINITY; count],
             log_odds: (0..count).map(|number| -3.0 - 0.3 * number as f64).collect(),
             active: vec![true; count],
             scanned: count,

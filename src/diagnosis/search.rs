@@ -243,6 +243,7 @@ mod tests {
             hypotheses: (0..count).map(of).collect(),
             first: (0..count).collect(),
             unit: vec![1.0; count],
+            widest: vec![f64::INFINITY; count],
             log_odds: vec![-2.0; count],
             active: vec![true; count],
             scanned: count,

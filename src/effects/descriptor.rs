@@ -25,6 +25,8 @@ pub struct Descriptor {
     pub source: Source,
     /// How many times the upper end of the range it reaches on hobby and cable-driven arms.
     pub softest: f64,
+    /// How many times the upper end of the range a magnitude is on the worst of arms: no prior is wider.
+    pub most: f64,
     /// Whether physics allows one sign only, in which case the diagnosis allows no other. Kinds of several coefficients have no sign.
     pub one_signed: bool,
     /// Whether results tell its sign beside its magnitude, which is positive then (as a width is).

@@ -118,7 +118,8 @@ pub struct TruePose {
 pub struct TrueYield {
     /// Joint, from 1.
     pub joint: usize,
-    /// Name of the effect. Bending has two: about x, then about y of the link.
+    /// Name of the effect. Bending has three at a place: half of what turns about the link's x, what turns about y, the
+    /// other half.
     pub effect: String,
     /// rad, or m where the joint slides.
     pub value: f64,

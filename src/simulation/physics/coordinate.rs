@@ -13,15 +13,42 @@ pub(in crate::simulation) struct Coordinate {
 pub(in crate::simulation) enum Direction {
     /// About the joint's axis (along it where the joint slides).
     Joint,
-    /// About the x axis of the link, across the joint's: with y a Cardan joint. How it shares a large bend between its axes is of
-    /// second order in the bend.
-    AcrossX,
-    /// About the y axis, turned with the bend about x.
-    AcrossY,
-    /// As [`Direction::AcrossX`], but across a link that is a beam, at a point of [`BEAM_POINTS`].
-    AcrossBeamX { point: usize },
-    /// As [`Direction::AcrossY`], but across a link that is a beam, at a point of [`BEAM_POINTS`].
-    AcrossBeamY { point: usize },
+    /// Across the link, at a place of it.
+    Across { bend: Bend, axis: Axis },
+}
+
+/// Where a link bends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::simulation) enum Bend {
+    /// At the joint: x and y are those of the link, across the joint's axis.
+    Joint,
+    /// At a point of [`BEAM_POINTS`]: x and y are across the line from joint to joint.
+    Beam { point: usize },
+}
+
+/// An axis of a place where a link bends. A bend of so much about two axes is one turn about an axis between them; hinges one after the
+/// other twist the link besides, by half the product of their angles. With half of x before y and half after it, that twist is nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::simulation) enum Axis {
+    /// Half of what turns about x.
+    FirstX,
+    /// About y, turned with what is before it.
+    Y,
+    /// The other half.
+    LastX,
+}
+
+impl Axis {
+    /// In the order of the series.
+    pub(in crate::simulation) const ALL: [Axis; 3] = [Axis::FirstX, Axis::Y, Axis::LastX];
+
+    /// Its part of all that turns about its direction.
+    pub(in crate::simulation) const fn share(self) -> f64 {
+        match self {
+            Axis::FirstX | Axis::LastX => 0.5,
+            Axis::Y => 1.0,
+        }
+    }
 }
 
 /// Where a beam is hinged, as shares of its length: the points of Gauss's rule, 1/2 ∓ 1/(2 √3).

@@ -4,7 +4,7 @@
 use nalgebra::{Translation3, Vector3};
 
 use super::clearance::Clearance;
-use super::coordinate::{Coordinate, Direction, Law};
+use super::coordinate::{Axis, Bend, Coordinate, Direction, Law};
 use super::drive_train::Drive;
 use super::error::PhysicsError;
 use super::true_arm::{Placement, TrueArm};
@@ -234,9 +234,12 @@ fn series(coordinate: &Coordinate) -> usize {
         (Law::Backlash { .. }, _) => 0,
         (Law::LostMotion { .. }, _) => 1,
         (_, Direction::Joint) => 2,
-        (_, Direction::AcrossX) => 3,
-        (_, Direction::AcrossY) => 4,
-        (_, Direction::AcrossBeamX { point }) => 5 + 2 * point,
-        (_, Direction::AcrossBeamY { point }) => 6 + 2 * point,
+        (_, Direction::Across { bend, axis }) => {
+            let place = match bend {
+                Bend::Joint => 0,
+                Bend::Beam { point } => 1 + point,
+            };
+            3 + Axis::ALL.len() * place + axis as usize
+        }
     }
 }

@@ -85,7 +85,8 @@ pub struct Settled {
 pub struct Yield {
     /// Index of the joint.
     pub joint: usize,
-    /// Name of the effect. Bending has two coordinates: about x, then about y of the link.
+    /// Name of the effect. Bending has three coordinates at a place: half of what turns about the link's x, what turns
+    /// about y, the other half.
     pub effect: &'static str,
     /// rad, or m where the joint slides.
     pub value: f64,

@@ -9,7 +9,7 @@ use super::settling::{Settled, Settling, Start};
 use super::test_arms;
 use crate::arm::Arm;
 use crate::arm::JointKind::{Prismatic, Revolute};
-use crate::arm::frames::pose_error;
+use crate::arm::frames::{pose_error, rotation_vector};
 use crate::seed::stream;
 use crate::simulation::effect::{Effect, Foot, Growing, Moves};
 
@@ -113,6 +113,29 @@ fn what_creeps_comes_to_the_place_of_a_spring() {
     let (parted, whole) = (creeps.settle(&parted), creeps.settle(&at(30.0)));
     let error = pose_error(&parted.base_from_tool, &whole.base_from_tool).norm();
     assert!(error < 2e-3 * value(&whole, "creep_after_motion").abs(), "{error:e}");
+}
+
+/// One turn about an axis across the joint's: nothing of it about the joint's, not even half the product of its parts.
+#[test]
+fn a_link_that_bends_far_is_not_twisted() {
+    let arm = test_arms::eight();
+    let joints = [0.3, 0.8, -0.5, 1.0, 0.2, -0.4, 0.1, 0.6];
+    let conditions = Conditions { payload_kg: 4.0, ..Conditions::still(&joints, &[0.0; 9]) };
+    let straight = new(&arm, &[]).settle(&conditions);
+    let turn = |link: usize| {
+        let bent = new(&arm, &[Effect::LinkBending { link, compliance: 2e-3, beam: false }]).settle(&conditions);
+        // The tool turns by as much as the link's end, about the same axis.
+        let axis = straight.base_from_link[link + 1].rotation;
+        let turn = bent.base_from_tool.rotation * straight.base_from_tool.rotation.inverse();
+        rotation_vector(&(axis.inverse() * turn * axis))
+    };
+    let turns: Vec<Vector3<f64>> = (0..8).map(turn).collect();
+    let product = |turn: &Vector3<f64>| 0.5 * (turn.x * turn.y).abs();
+    let largest = turns.iter().map(product).fold(0.0, f64::max);
+    assert!(largest > 1e-5, "{turns:?}");
+    for turn in &turns {
+        assert!(turn.z.abs() < 0.05 * largest, "{turn:?} {largest:e}");
+    }
 }
 
 fn everything() -> Vec<Effect> {

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::clearance::{Clearance, SeatedBy};
 use super::conditions::Conditions;
-use super::coordinate::{BEAM_POINTS, Coordinate, Direction};
+use super::coordinate::{BEAM_POINTS, Bend, Coordinate, Direction};
 use super::drive_train::Drive;
 use super::error::PhysicsError;
 use super::mechanism::{Held, Mechanisms, Reactions, Shift, shifted};
@@ -170,8 +170,8 @@ impl TrueArm {
     /// Where the hinge of `coordinate` is, seen from the frame after its joint's motion.
     pub(super) fn hinge(&self, coordinate: &Coordinate, placement: &Placement) -> Pose {
         let point = match coordinate.direction {
-            Direction::Joint | Direction::AcrossX | Direction::AcrossY => return Pose::identity(),
-            Direction::AcrossBeamX { point } | Direction::AcrossBeamY { point } => point,
+            Direction::Joint | Direction::Across { bend: Bend::Joint, .. } => return Pose::identity(),
+            Direction::Across { bend: Bend::Beam { point }, .. } => point,
         };
         // From the joint's origin, which does not slide with it, to the next one's.
         let start = match self.kinds[coordinate.joint] {

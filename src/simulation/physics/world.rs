@@ -20,7 +20,7 @@ use rapier3d::pipeline::PhysicsWorld;
 
 use super::clearance::SeatedBy;
 use super::convert::{matrix_to_rapier, pose_from_rapier, pose_to_rapier, vector_to_rapier};
-use super::coordinate::{Coordinate, Direction, Hold, Law};
+use super::coordinate::{Axis, Coordinate, Direction, Hold, Law};
 use super::play::{Decision, Load, Play};
 use super::true_arm::{Placement, TrueArm, turn_about_z};
 use crate::arm::JointKind;
@@ -445,8 +445,8 @@ fn axis_of(coordinate: &Coordinate, kind: JointKind) -> JointAxis {
     match (coordinate.direction, kind) {
         (Direction::Joint, JointKind::Revolute) => JointAxis::AngZ,
         (Direction::Joint, JointKind::Prismatic) => JointAxis::LinZ,
-        (Direction::AcrossX | Direction::AcrossBeamX { .. }, _) => JointAxis::AngX,
-        (Direction::AcrossY | Direction::AcrossBeamY { .. }, _) => JointAxis::AngY,
+        (Direction::Across { axis: Axis::FirstX | Axis::LastX, .. }, _) => JointAxis::AngX,
+        (Direction::Across { axis: Axis::Y, .. }, _) => JointAxis::AngY,
     }
 }
 
