@@ -300,6 +300,9 @@ pub(crate) struct RobotOptions {
     /// Declared orientation noise of a table's sensor, one sigma per axis [default: 0.005]
     #[arg(long = "attitude-noise-deg", value_name = "DEG", allow_negative_numbers = true)]
     pub(crate) orientation_noise_deg: Option<f64>,
+    /// Gravity in the robot's root link, m/s²: 9.81,0,0 for a robot on a wall, 0,0,9.81 for one that hangs [default: as the file has it]
+    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_negative_numbers = true)]
+    pub(crate) gravity: Vec<f64>,
 }
 
 #[derive(Debug, Args)]

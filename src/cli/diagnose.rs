@@ -1,19 +1,20 @@
 //! `kincal diagnose`: what causes what a calibration leaves.
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 
 use super::Outcome;
 use super::arguments::{DiagnoseOptions, Global};
 use super::output::Audience;
 use super::{input, output};
 use crate::arm::Arm;
+use crate::diagnosis::gravity::Gravity;
 use crate::diagnosis::outcome::{Diagnosis, NoiseSource, Verdict};
 use crate::diagnosis::settings::Settings;
 use crate::diagnosis::{self, Options};
 use crate::effects::Kind;
 use crate::event::{Event, Start};
 use crate::lab::confirm::{Answer, confirm};
-use crate::measurement::{Measurement, Sensor, table};
+use crate::measurement::{Measurement, Sensor};
 use crate::progress::Progress as _;
 use crate::{lab, report, scene, session};
 
@@ -29,14 +30,18 @@ pub(crate) fn command(global: &Global, options: &DiagnoseOptions) -> anyhow::Res
     let subject = subject(global, options)?;
     let rows: Vec<&Measurement> = subject.measurements.iter().collect();
     let settings = settings(&subject.settings, &options.set)?;
-    let options_of_diagnosis = Options { without, settings, ..Options::new(subject.noise) };
+    // A scene says how its arm stands; a URDF does not.
+    let is_urdf = subject.start.real.as_ref().is_some_and(|real| real.urdf.is_some());
+    let gravity = if is_urdf { Gravity::Assumed } else { Gravity::Known };
+    let options_of_diagnosis = Options { without, settings, gravity, ..Options::new(subject.noise) };
     let conclusion = diagnosis::diagnose(&subject.arm, &subject.sensor, &rows, &options_of_diagnosis)
         .with_context(|| options.input.display().to_string())?;
     let mut diagnosis = report::wording::diagnosis(conclusion);
     diagnosis.notes.extend(subject.notes.iter().cloned());
     show(global, options, &subject, &diagnosis)?;
     let confirmation = if options.confirm {
-        let confirmation = confirm(&diagnosis, &subject.arm, &subject.sensor, &rows);
+        let arm = as_mounted(&subject, &diagnosis)?;
+        let confirmation = confirm(&diagnosis, &arm, &subject.sensor, &rows);
         Some(confirmation.with_context(|| options.input.display().to_string())?)
     } else {
         None
@@ -56,6 +61,20 @@ pub(crate) fn command(global: &Global, options: &DiagnoseOptions) -> anyhow::Res
         Verdict::NoGap | Verdict::Explained => Outcome::Good,
         Verdict::Ambiguous | Verdict::UnknownRemains | Verdict::NotDetectable => Outcome::Bad,
     })
+}
+
+/// The arm under gravity as the diagnosis has it.
+fn as_mounted(subject: &Subject, diagnosis: &Diagnosis) -> anyhow::Result<Arm> {
+    let of_rows = |row: &Measurement| row.gravity_m_s2;
+    let first = subject.measurements.first().and_then(of_rows);
+    ensure!(
+        subject.measurements.iter().all(|row| of_rows(row) == first),
+        "--confirm simulates an arm under one gravity, and the rows have several: give the rows of one of them"
+    );
+    let gravity = diagnosis.gravity_m_s2.or(first);
+    let mut arm = subject.arm.clone();
+    arm.gravity_in_base = gravity.map_or(arm.gravity_in_base, Into::into);
+    Ok(arm)
 }
 
 /// Shows readings and diagnosis in the viewer; nothing is recorded.
@@ -135,11 +154,18 @@ fn subject(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Subject
     }
     let robot = input::robot_of_table(&options.input, &options.robot)?;
     let (start, real) = input::described("diagnose", robot, &options.robot)?;
-    let table = table::read(&options.input)?;
-    let (arm, notes) = session::real_robot(&start, &real).with_context(|| robot.display().to_string())?;
+    let mut table = input::read_table(&options.input, &options.robot)?;
+    let (arm, mut notes) = session::real_robot(&start, &real).with_context(|| robot.display().to_string())?;
     input::check_units(&options.input, &table, &arm)?;
     input::check_joints(&options.input, &table.measurements, arm.joint_count())?;
     let noise = if options.robot.position_noise_um.is_some() { NoiseSource::Declared } else { NoiseSource::Assumed };
     let sensor = session::real_sensor(&real, &table.measurements);
+    if table.fill_in_approach() {
+        notes.push(
+            "no columns of approach: rows are taken to be in the order of measuring, and each joint to come from where the row before has \
+             it; where they are not, write `# order: unknown` under the header"
+                .to_owned(),
+        );
+    }
     Ok(Subject { start, arm, sensor, noise, settings: Settings::default(), measurements: table.measurements, notes })
 }

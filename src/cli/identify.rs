@@ -46,7 +46,7 @@ fn from_recording(global: &Global, options: &IdentifyOptions) -> anyhow::Result<
 fn from_table(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outcome> {
     let robot = input::robot_of_table(&options.input, &options.robot)?;
     let (start, real) = input::described("identify", robot, &options.robot)?;
-    let table = table::read(&options.input)?;
+    let table = input::read_table(&options.input, &options.robot)?;
     if !table.conditions.is_empty() {
         output::note(global, &format!("note: an identification does not use {}", table.conditions.join(", ")));
     }

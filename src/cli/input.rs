@@ -59,6 +59,19 @@ pub(crate) fn described(command: &str, robot: &Path, options: &RobotOptions) -> 
     Ok((Start { real: Some(real.clone()), ..session::start_event(command, &scene) }, real))
 }
 
+/// Reads the table of `input`, with gravity as it was said on the command line.
+pub(crate) fn read_table(path: &Path, options: &RobotOptions) -> anyhow::Result<table::Table> {
+    let mut table = table::read(path)?;
+    if !options.gravity.is_empty() {
+        let said = options.gravity.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+        let Ok(gravity) = <[f64; 3]>::try_from(options.gravity.as_slice()) else {
+            bail!("--gravity {said}: three numbers are needed, such as 0,0,-9.81 for a robot that stands upright");
+        };
+        table.set_gravity(gravity).map_err(|what| anyhow::anyhow!("--gravity {said}: {what}"))?;
+    }
+    Ok(table)
+}
+
 /// Refuses lengths for joints that turn and angles for joints that slide.
 pub(crate) fn check_units(path: &Path, table: &table::Table, arm: &Arm) -> anyhow::Result<()> {
     for (number, (is_length, joint)) in table.joint_is_length.iter().zip(&arm.chain.joints).enumerate() {
@@ -98,6 +111,7 @@ pub(crate) fn no_links(options: &RobotOptions, why: &str) -> anyhow::Result<()> 
 /// Refuses a robot beside a recording, which has its own.
 pub(crate) fn no_robot(options: &RobotOptions) -> anyhow::Result<()> {
     no_links(options, "a recording carries its own nominal arm; leave it out")?;
+    ensure!(options.gravity.is_empty(), "--gravity: a recording has its own; leave it out");
     ensure!(
         options.robot.is_none(),
         "--robot {}: a recording carries its own nominal arm; give --robot with a table (.csv) only",

@@ -32,6 +32,8 @@ pub struct Conclusion {
     pub next: Vec<Advice>,
     /// What was assumed, switched off, thinned out or left out.
     pub notes: Vec<Note>,
+    /// Gravity in the root frame, m/s², where the readings have told and not the robot's file.
+    pub gravity_m_s2: Option<[f64; 3]>,
     /// Number of readings used.
     pub readings: usize,
     /// Every number that decided.
@@ -177,6 +179,11 @@ pub enum Note {
     NoPayload,
     /// No masses are known of the arm.
     NoMasses,
+    /// Nobody said which way gravity acts, and the readings do.
+    Gravity {
+        /// In root, m/s².
+        m_s2: [f64; 3],
+    },
     /// What the fit of the geometry says, in its own words.
     Geometry(String),
     /// No fit settles around what was found.

@@ -111,7 +111,7 @@ pub(crate) fn conditions(
             share: if time { (measurement.time_s - begin) / (end - begin) } else { 0.0 },
             order: order[row],
             torque_memory: vec![[0.0; FORGETTING_S.len()]; count],
-            gravity: rows.mechanism.gravity,
+            gravity: measurement.gravity(&rows.mechanism.gravity),
             memory: vec![[0.0; MEMORIES.len()]; count],
         });
     }

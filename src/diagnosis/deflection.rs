@@ -102,7 +102,7 @@ pub(super) fn deflected(rows: &Rows, reading: &Reading, payload_kg: f64, present
     let still = &reading.posture;
     let offset_in_tool = still.tool_axes.transpose() * (reading.target - still.tool);
     let moved = |motions: &[Motion]| -> (Posture, Vector3<f64>, Displacement) {
-        let posture = rows.mechanism.posture_moved(&reading.joints, payload_kg, &motions[..=joints]);
+        let posture = rows.mechanism.posture_moved(&reading.joints, payload_kg, &reading.gravity, &motions[..=joints]);
         let target = motions[joints + 1].of_point(&(posture.tool + posture.tool_axes * offset_in_tool));
         let turned = motions[joints + 1].rotation * posture.tool_axes * still.tool_axes.transpose();
         let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turned));

@@ -16,6 +16,7 @@ pub(crate) mod deflection;
 mod detectability;
 mod evidence;
 mod gap;
+pub mod gravity;
 mod groups;
 pub(crate) mod held_out;
 mod linear;
@@ -48,7 +49,7 @@ pub use evidence::Extension;
 pub use held_out::Block;
 pub use rows::{DiagnosisError, check_robot};
 
-use nalgebra::DVector;
+use nalgebra::{DVector, Vector3};
 
 use crate::arm::Arm;
 use crate::effects::signature::library::{Hypothesis, library, ripple};
@@ -61,6 +62,7 @@ use conclusion::Conclusion;
 use conditions::Conditions;
 use deflection::{Loads, Present, present};
 use evidence::{Candidates, Evidence, NoisePrior};
+use gravity::Gravity;
 use groups::{Groups, Repeats};
 use held_out::{HeldOut, Scheme, Validation};
 use linear::Linear;
@@ -81,6 +83,8 @@ pub struct Options {
     pub without: Vec<Kind>,
     /// Nothing but these kinds at these places, for who knows what is there.
     pub only: Option<Vec<(Kind, Location)>>,
+    /// Where gravity's direction comes from.
+    pub gravity: Gravity,
     /// Every number that decides.
     pub settings: Settings,
 }
@@ -89,7 +93,7 @@ impl Options {
     /// The whole library.
     #[must_use]
     pub fn new(noise: NoiseSource) -> Options {
-        Options { noise, without: Vec::new(), only: None, settings: Settings::default() }
+        Options { noise, without: Vec::new(), only: None, gravity: Gravity::Known, settings: Settings::default() }
     }
 
     /// Whether `kind` (`None`: a shape without a name) is looked for at `place`.
@@ -479,6 +483,8 @@ pub(crate) struct Analysis<'a> {
     pub(crate) correlation: Option<f64>,
     /// Whether the fit around what was found went astray.
     pub(crate) astray: bool,
+    /// Gravity in root, m/s², where the readings have told.
+    pub(crate) gravity: Option<Vector3<f64>>,
     pub(crate) options: &'a Options,
 }
 
@@ -501,7 +507,10 @@ pub fn diagnose(
 ) -> Result<Conclusion, DiagnosisError> {
     let settings = &options.settings;
     settings.check()?;
-    let data = Data::new(arm, sensor, measurements, options);
+    let mut data = Data::new(arm, sensor, measurements, options);
+    let sought = if options.gravity == Gravity::Assumed { gravity::sought(&data)? } else { None };
+    let turned = sought.map(|gravity_in_base| Arm { gravity_in_base, ..arm.clone() });
+    data.arm = turned.as_ref().unwrap_or(arm);
     let (state, pass) = settle(&data)?;
     let linear = pass.linear();
     let marginal = Marginal::new(&pass.products, None, &linear.prior).ok_or(GeometryError::Degenerate)?;
@@ -548,6 +557,7 @@ pub fn diagnose(
         sensor: &Sensor { orientation_sigma_rad, ..sensor.clone() },
         repeats: data.repeats,
         astray: state.astray,
+        gravity: sought,
         correlation: (data.groups.rows.len() < measurements.len()).then_some(pass.weighed.correlation),
         options,
     };

@@ -12,6 +12,7 @@ use crate::effects::signature::posture::Posture;
 pub(super) fn notes(analysis: &Analysis<'_>, level: f64, noise_floor: &NoiseFloor, gap: &Gap) -> Vec<Note> {
     let decision = &analysis.options.settings.decision;
     let mut notes = analysis.conditions.notes.clone();
+    notes.extend(analysis.gravity.map(|gravity| Note::Gravity { m_s2: gravity.into() }));
     notes.extend(analysis.linear.rows.notes.iter().cloned().map(Note::Geometry));
     if analysis.astray {
         notes.push(Note::Astray);

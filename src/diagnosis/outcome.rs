@@ -36,6 +36,9 @@ pub struct Diagnosis {
     pub next_measurements: Vec<String>,
     /// What was assumed, switched off, thinned out or left out.
     pub notes: Vec<String>,
+    /// Gravity in the root frame, m/s², where the readings have told and not the robot's file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity_m_s2: Option<[f64; 3]>,
     /// Number of readings used.
     pub readings: usize,
     /// Every number that decided, where they are not as usual or the version is another.

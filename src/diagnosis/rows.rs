@@ -209,8 +209,10 @@ pub(crate) fn fit(arm: &Arm, readings: Readings<'_>) -> Result<Rows, DiagnosisEr
 
 fn of_geometry(arm: &Arm, measurements: &[&Measurement], fitted: geometry::Geometry) -> Rows {
     let mechanism = Mechanism::new(arm).with_chain(fitted.root_to_tool());
-    let postures: Vec<Posture> =
-        measurements.iter().map(|row| mechanism.posture(&row.joints, row.payload_kg.unwrap_or(0.0))).collect();
+    let posture = |row: &&Measurement| {
+        mechanism.posture_moved(&row.joints, row.payload_kg.unwrap_or(0.0), &row.gravity(&mechanism.gravity), &[])
+    };
+    let postures: Vec<Posture> = measurements.iter().map(posture).collect();
     let places = fitted.tool_from_target();
     let targets = postures
         .iter()

@@ -126,6 +126,8 @@ settings! {
         decision: Decision = Decision::default(),
         /// What would have shown.
         power: Power = Power::default(),
+        /// Which way gravity acts.
+        gravity: Gravity = Gravity::default(),
     }
 
     /// What tells the noise.
@@ -228,6 +230,19 @@ settings! {
         scales: [f64; SCALES] = [1.0, 2.5, 12.0, 150.0] => 1e-6..=1e6,
         /// How likely each of them is.
         scale_shares: [f64; SCALES] = [0.44, 0.44, 0.10, 0.02] => SHARE,
+    }
+
+    /// Which way gravity acts, where nobody said.
+    Gravity {
+        /// How much likelier, as a logarithm, robots stand upright than on a certain wall or ceiling.
+        wall: f64 = 7.0 => 0.0..=MANY,
+        /// The same of any slope, the choice among all of them included.
+        slope: f64 = 15.0 => 0.0..=MANY,
+        /// Share of what geometry leaves beyond the noise that yielding under it explains at least, and of which yielding of an upright arm
+        /// does not explain the rest.
+        explains: f64 = 0.5 => SHARE,
+        /// Angle from upright below which nothing is said, rad.
+        apart_rad: f64 = 0.1 => 0.0..=3.2,
     }
 
     /// The search over sets of effects.

@@ -132,6 +132,7 @@ pub(crate) fn with_analysis(off: impl Fn(&Arm, &[f64], &[i8], usize, f64) -> f64
         repeats: None,
         correlation: None,
         astray: false,
+        gravity: None,
         options: &options,
     });
 }

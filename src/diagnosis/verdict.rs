@@ -34,6 +34,7 @@ pub(super) fn conclude(analysis: &Analysis<'_>) -> Conclusion {
         next: next(analysis, &confusion_sets, &power, verdict),
         notes,
         settings: analysis.options.settings.clone(),
+        gravity_m_s2: analysis.gravity.map(Into::into),
         readings: analysis.measurements.len(),
         residuals: residuals(analysis, &named.of_member),
         noise_floor,

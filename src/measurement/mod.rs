@@ -60,6 +60,9 @@ pub struct Measurement {
     /// Session: readings of one session share the set-up (tool, base, sensor).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub session: Option<String>,
+    /// Gravity in the robot's root frame at this reading, m/s²; absent where nobody said: that of the robot's file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity_m_s2: Option<[f64; 3]>,
     /// Which reflector on the tool was read, where there are several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<String>,
@@ -74,6 +77,12 @@ impl Measurement {
     #[must_use]
     pub fn position(&self) -> Point3<f64> {
         Point3::from(self.position_m)
+    }
+
+    /// Gravity in the root frame, m/s², where that of the robot's file is `usual`.
+    #[must_use]
+    pub fn gravity(&self, usual: &Vector3<f64>) -> Vector3<f64> {
+        self.gravity_m_s2.map_or(*usual, Vector3::from)
     }
 
     /// The measured orientation, where there is one.

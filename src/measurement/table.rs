@@ -3,7 +3,8 @@
 //! A header names the columns and their units; `#` starts a comment line; columns stand in any order; an unknown column is an error.
 //! `pose_id`, `time_s`, `q1_rad`…`qN_rad` (or `_deg`; `_m`, `_mm` for prismatic joints), `x_m, y_m, z_m` (or `_mm`; those that were
 //! read, a cell may be empty), optional `qx, qy, qz, qw`, `role` (`fit`, `held_out`), and the conditions: `approach1`… (-1, 0, 1), `temp_ambient_c`, `temp1_c`…, `payload_kg`,
-//! `dwell_s`, `session`, `target`.
+//! `dwell_s`, `session`, `target`, `gravity_x, gravity_y, gravity_z` (m/s², in the robot's root). Rows are in the order of measuring unless
+//! the comment `# order: unknown` stands in the file.
 
 use std::path::Path;
 
@@ -18,6 +19,66 @@ pub struct Table {
     pub joint_is_length: Vec<bool>,
     /// Columns of conditions: an identification does not use them, a diagnosis does.
     pub conditions: Vec<String>,
+    /// Whether rows are in the order of measuring, or have the times of it.
+    pub in_order: bool,
+}
+
+/// A joint that moves by less has not moved, rad or m: joint readings come back rounded, or as encoders see them.
+const MOVED: f64 = 2e-4;
+
+impl Table {
+    /// Where no sides of approach were recorded and rows are in the order of measuring, fills them in: a joint comes from where it was in
+    /// the row before, or where it stays, from where it came last. Returns whether it did.
+    pub fn fill_in_approach(&mut self) -> bool {
+        let rows = &mut self.measurements;
+        if !self.in_order || rows.len() < 2 || rows.iter().any(|row| !row.approach.is_empty()) {
+            return false;
+        }
+        let mut order: Vec<usize> = (0..rows.len()).collect();
+        order.sort_by(|a, b| rows[*a].time_s.total_cmp(&rows[*b].time_s).then(a.cmp(b)));
+        let mut before: Option<usize> = None;
+        for row in order {
+            let last = before.filter(|last| rows[*last].session == rows[row].session);
+            let side = |joint: usize| -> i8 {
+                let Some(last) = last.map(|last| &rows[last]) else {
+                    return 0;
+                };
+                let moved = rows[row].joints[joint] - last.joints[joint];
+                if moved.abs() < MOVED { last.approach[joint] } else { moved.signum() as i8 }
+            };
+            rows[row].approach = (0..rows[row].joints.len()).map(side).collect();
+            before = Some(row);
+        }
+        true
+    }
+
+    /// Gravity in the robot's root, m/s², for all rows.
+    ///
+    /// # Errors
+    /// If it is none, or the table has columns of its own.
+    pub fn set_gravity(&mut self, gravity: [f64; 3]) -> Result<(), String> {
+        if self.measurements.iter().any(|row| row.gravity_m_s2.is_some()) {
+            return Err("the table has gravity_x, gravity_y, gravity_z: one of both is enough".to_owned());
+        }
+        let gravity = free_fall(gravity)?;
+        self.measurements.iter_mut().for_each(|row| row.gravity_m_s2 = Some(gravity));
+        Ok(())
+    }
+}
+
+/// Free fall, m/s².
+const FREE_FALL: f64 = 9.81;
+/// A tilt sensor's length may be off by so much: its direction counts.
+const OFF: f64 = 0.05;
+
+/// Gravity of the usual length in the direction of `read`.
+fn free_fall(read: [f64; 3]) -> Result<[f64; 3], String> {
+    let length = read.iter().map(|value| value * value).sum::<f64>().sqrt();
+    if (length / FREE_FALL - 1.0).abs() <= OFF {
+        return Ok(read.map(|value| value * FREE_FALL / length));
+    }
+    let hint = if (length - 1.0).abs() <= OFF { ": these seem to be multiples of g" } else { "" };
+    Err(format!("gravity is {length:.3} m/s² long; {FREE_FALL} is needed{hint}"))
 }
 
 /// A table that cannot be used.
@@ -61,10 +122,11 @@ enum Column {
     Dwell,
     Session,
     Target,
+    Gravity { axis: usize },
 }
 
 const ALLOWED: &str = "pose_id, time_s, q1_rad… (or _deg, _m, _mm), x_m, y_m, z_m (or _mm), qx, qy, qz, qw, role, target, \
-                       approach1…, temp_ambient_c, temp1_c…, payload_kg, dwell_s, session";
+                       approach1…, temp_ambient_c, temp1_c…, payload_kg, dwell_s, session, gravity_x, gravity_y, gravity_z";
 
 /// Reads the table at `path`.
 ///
@@ -172,7 +234,14 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
                 }
                 Column::Session => row.session = Some(text.to_owned()),
                 Column::Target => row.target = Some(text.to_owned()),
+                Column::Gravity { axis } => {
+                    let value = number()?;
+                    row.gravity_m_s2.get_or_insert_default()[*axis] = value;
+                }
             }
+        }
+        if let Some(read) = row.gravity_m_s2 {
+            row.gravity_m_s2 = Some(free_fall(read).map_err(|what| wrong(line, what))?);
         }
         if row.unread == [true; 3] {
             return Err(wrong(line, "none of x, y, z was read; leave the row out".to_owned()));
@@ -193,8 +262,8 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
         return Err(wrong(header_line, "the table has a header but no rows".to_owned()));
     }
     let is_condition = |column: &Column| {
-        use Column::{Ambient, Approach, Dwell, Payload, Session, Target};
-        matches!(column, Approach { .. } | Ambient | Payload | Dwell | Session | Target)
+        use Column::{Ambient, Approach, Dwell, Gravity, Payload, Session, Target};
+        matches!(column, Approach { .. } | Gravity { .. } | Ambient | Payload | Dwell | Session | Target)
     };
     let conditions =
         header.iter().zip(&columns).filter(|(_, column)| is_condition(column)).map(|(name, _)| name.to_owned()).collect();
@@ -204,7 +273,12 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
             joint_is_length[*joint] = *is_length;
         }
     }
-    Ok(Table { measurements, joint_is_length, conditions })
+    let is_unknown = |line: &str| {
+        let said = line.trim_start().strip_prefix('#').map(|said| said.replace(char::is_whitespace, "").to_lowercase());
+        said.is_some_and(|said| said == "order:unknown")
+    };
+    let in_order = columns.contains(&Column::Time) || !text.lines().any(is_unknown);
+    Ok(Table { measurements, joint_is_length, conditions, in_order })
 }
 
 fn not_negative(value: f64) -> Result<f64, String> {
@@ -231,6 +305,7 @@ pub fn write(measurements: &[Measurement], slides: &[bool]) -> Result<String, cs
     let sensors = measurements.iter().map(|row| row.temperatures_c.len()).min().unwrap_or(0);
     let orientation = every(|row| row.orientation_xyzw.is_some());
     let approach = every(|row| !row.joints.is_empty() && row.approach.len() == row.joints.len());
+    let gravity = every(|row| row.gravity_m_s2.is_some());
     let optional = [
         ("temp_ambient_c", every(|row| row.ambient_c.is_some())),
         ("payload_kg", every(|row| row.payload_kg.is_some())),
@@ -247,6 +322,7 @@ pub fn write(measurements: &[Measurement], slides: &[bool]) -> Result<String, cs
     header.extend(names(orientation, &["qx", "qy", "qz", "qw"]));
     header.extend((1..=sensors).map(|sensor| format!("temp{sensor}_c")));
     header.extend((1..=joints).filter(|_| approach).map(|joint| format!("approach{joint}")));
+    header.extend(names(gravity, &["gravity_x", "gravity_y", "gravity_z"]));
     header.extend(optional.iter().filter(|(_, present)| *present).map(|(name, _)| (*name).to_owned()));
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(&header)?;
@@ -258,6 +334,7 @@ pub fn write(measurements: &[Measurement], slides: &[bool]) -> Result<String, cs
         fields.extend(axes.iter().map(|axis| if row.unread[*axis] { String::new() } else { row.position_m[*axis].to_string() }));
         fields.extend(quaternion.chain(&row.temperatures_c[..sensors]).map(f64::to_string));
         fields.extend(row.approach.iter().filter(|_| approach).map(i8::to_string));
+        fields.extend(row.gravity_m_s2.iter().flatten().filter(|_| gravity).map(f64::to_string));
         let number = |value: Option<f64>| value.map(|value| value.to_string());
         let values =
             [number(row.ambient_c), number(row.payload_kg), number(row.dwell_s), row.session.clone(), row.target.clone()];
@@ -341,6 +418,13 @@ impl Layout {
             Ok(count) if count == joints => count,
             _ => return Err(format!("directions of approach need approach1 … approach{joints}: one column per joint, or none")),
         };
+        let axes = numbered(columns, |column| match column {
+            Column::Gravity { axis } => Some(*axis),
+            _ => None,
+        });
+        if !matches!(axes, Ok(0 | 3)) {
+            return Err("gravity needs all of gravity_x, gravity_y, gravity_z (m/s²), or none".to_owned());
+        }
         Ok(Layout { joints, sensors, approaches, orientation, read: of_axes.map(|count| count == 1) })
     }
 }
@@ -373,6 +457,10 @@ fn column(name: &str) -> Result<Column, String> {
     }
     if let Some(component) = ["qx", "qy", "qz", "qw"].iter().position(|known| *known == name) {
         return Ok(Column::Quaternion { component });
+    }
+    let bare = name.strip_suffix("_m_s2").unwrap_or(name);
+    if let Some(axis) = ["gravity_x", "gravity_y", "gravity_z"].iter().position(|known| *known == bare) {
+        return Ok(Column::Gravity { axis });
     }
     let unknown = || {
         Err(match name {
@@ -463,6 +551,7 @@ mod tests {
             dwell_s: Some(1.5),
             session: Some("day 2, \"morning\"".to_owned()),
             target: Some("A".to_owned()),
+            gravity_m_s2: Some([0.0, 9.81, 0.0]),
         };
         let rows = vec![row(0), row(1), row(2)];
         assert_eq!(parse(&write(&rows, &[]).unwrap(), "t.csv").unwrap().measurements, rows);
@@ -481,6 +570,25 @@ mod tests {
         let some = vec![Measurement { payload_kg: None, approach: Vec::new(), ..row(0) }, row(1)];
         let back = parse(&write(&some, &[]).unwrap(), "t.csv").unwrap();
         assert_eq!(back.measurements[1], Measurement { payload_kg: None, approach: Vec::new(), ..row(1) });
+    }
+
+    /// A joint that stays keeps the side from which it came; a session begins anew; who says that rows have no order is believed.
+    #[test]
+    fn sides_of_approach_follow_from_the_order_of_rows() {
+        let text = "q1_rad,q2_rad,x_m,y_m,z_m,session\n0,0,0,0,0,a\n0.1,-0.1,0,0,0,a\n0.1,-0.2,0,0,0,a\n0.2,0.3,0,0,0,b\n0,0.30001,0,0,0,b\n";
+        let mut table = parse(text, "t.csv").unwrap();
+        assert!(table.fill_in_approach());
+        let sides = |table: &Table| table.measurements.iter().map(|row| row.approach.clone()).collect::<Vec<_>>();
+        assert_eq!(sides(&table), [[0, 0], [1, -1], [1, -1], [0, 0], [-1, 0]]);
+        // They are there now, and are not made again.
+        assert!(!table.fill_in_approach());
+        let (header, rows) = text.split_once('\n').unwrap();
+        let mut unknown = parse(&format!("{header}\n# Order: unknown\n{rows}"), "t.csv").unwrap();
+        assert!(!unknown.fill_in_approach() && unknown.measurements[1].approach.is_empty());
+        // Times tell the order, wherever rows stand.
+        let mut back = parse("time_s,q1_rad,x_m,y_m,z_m\n2,0.3,0,0,0\n1,0.5,0,0,0\n", "t.csv").unwrap();
+        assert!(back.fill_in_approach());
+        assert_eq!(sides(&back), [[-1], [0]]);
     }
 
     #[test]
@@ -507,6 +615,11 @@ mod tests {
             ("q1_rad,x_m,y_m,z_m,payload_kg\n0,0,0,0,-1\n", "line 2: `payload_kg` is -1; 0 or more is needed"),
             ("q1_rad,x_m,y_m,z_m,dwell_s\n0,0,0,0,-1\n", "line 2: `dwell_s` is -1; 0 or more is needed"),
             ("q1_rad,x_m,y_m,z_m,temp1_c\n0,0,0,0,-300\n", "line 2: `temp1_c` is -300 °C; more than -273.15"),
+            ("q1_rad,x_m,y_m,z_m,gravity_x\n0,0,0,0,9.81\n", "line 1: gravity needs all of gravity_x, gravity_y, gravity_z"),
+            (
+                "q1_rad,x_m,y_m,z_m,gravity_x,gravity_y,gravity_z\n0,0,0,0,1,0,0\n",
+                "line 2: gravity is 1.000 m/s² long; 9.81 is needed: these seem to be multiples of g",
+            ),
             ("q1_rad,x_m,x_m,y_m,z_m\n", "column `x_m` stands there twice"),
         ] {
             let message = parse(text, "t.csv").unwrap_err().to_string();

@@ -158,6 +158,7 @@ fn events(size: &Size) -> Vec<Event> {
     for (index, joints) in configurations(&mut stream, size.measurements).into_iter().enumerate() {
         let pose = chain.forward(&joints);
         events.push(Event::Measured(Measurement {
+            gravity_m_s2: Some([0.0, 0.0, -9.81]),
             index,
             pose_id: index,
             role: if index % 4 == 3 { Role::HeldOut } else { Role::Fit },
@@ -300,7 +301,8 @@ fn diagnosis(stream: &mut Stream, readings: usize) -> Diagnosis {
                 explained_rms_m: 1e-5,
                 left_out: vec![LeftOut {
                     name: "4 kg".to_owned(),
-                    readings: 30,
+                    gravity_m_s2: None,
+        readings: 30,
                     geometry_rms_m: 1e-4,
                     explained_rms_m: stream.uniform(0.0, 1e-5),
                 }],

@@ -35,10 +35,22 @@ pub fn diagnosis(conclusion: Conclusion) -> Diagnosis {
         maps: conclusion.maps,
         next_measurements: conclusion.next.iter().map(advice).collect(),
         notes: conclusion.notes.into_iter().map(note).collect(),
+        gravity_m_s2: conclusion.gravity_m_s2,
         readings: conclusion.readings,
         settings: conclusion.settings,
         residuals: conclusion.residuals,
     }
+}
+
+/// A direction in the root frame.
+fn towards(direction: [f64; 3]) -> String {
+    let length = libm::sqrt(direction.iter().map(|value| value * value).sum::<f64>()).max(1e-300);
+    let unit = direction.map(|value| value / length);
+    let axis = (0..3).find(|axis| unit[*axis].abs() > 0.9999);
+    axis.map_or_else(
+        || format!("along ({:.2}, {:.2}, {:.2}) of the base", unit[0], unit[1], unit[2]),
+        |axis| format!("along {}{} of the base", if unit[axis] > 0.0 { "+" } else { "-" }, ["x", "y", "z"][axis]),
+    )
 }
 
 /// The verdict in a sentence.
@@ -222,6 +234,14 @@ fn note(note: Note) -> String {
              physical unit"
                 .to_owned()
         }
+        Note::Gravity { m_s2 } => {
+            let [x, y, z] = m_s2.map(|value| format!("{:.2}", value + 0.0));
+            format!(
+                "nobody said which way gravity acts on this arm, and the readings do: {}, not down along -z of the base; all loads are \
+                 taken so. If that is right, say it with --gravity {x},{y},{z}; if it is not, with --gravity 0,0,-9.81",
+                towards(m_s2)
+            )
+        }
         Note::Geometry(said) => said,
         Note::Astray => {
             "no fit settles around what was found, so large is what several shapes together do where they nearly cancel: magnitudes hold to \
@@ -371,6 +391,7 @@ mod tests {
             maps: Vec::new(),
             next: Vec::new(),
             notes: Vec::new(),
+            gravity_m_s2: None,
             readings: 60,
             settings: Settings::default(),
             residuals: Vec::new(),

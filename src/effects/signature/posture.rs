@@ -98,13 +98,13 @@ impl Mechanism {
     /// The arm at the coordinates `joints` (rad or m), with a payload (kg) at the origin of its tool frame.
     #[must_use]
     pub fn posture(&self, joints: &[f64], payload_kg: f64) -> Posture {
-        self.posture_moved(joints, payload_kg, &[])
+        self.posture_moved(joints, payload_kg, &self.gravity, &[])
     }
 
     /// The same where rigid motions (in root) move what is outboard: `motions[0]` the whole arm, `motions[i]` what moves with joint `i`
-    /// (from 1) and beyond. None that is missing moves anything.
+    /// (from 1) and beyond. None that is missing moves anything. `gravity` in root, m/s².
     #[must_use]
-    pub fn posture_moved(&self, joints: &[f64], payload_kg: f64, motions: &[Motion]) -> Posture {
+    pub fn posture_moved(&self, joints: &[f64], payload_kg: f64, gravity: &Vector3<f64>, motions: &[Motion]) -> Posture {
         let count = self.joint_count();
         let (mut axes, mut frames, mut origins) = (Vec::new(), Vec::new(), Vec::new());
         let mut centres = Vec::with_capacity(count);
@@ -124,12 +124,12 @@ impl Mechanism {
         let (rotation, origin) = (carried.rotation * rotation, carried.of_point(&origin));
         let (mut forces, mut moments) = (vec![Vector3::zeros(); count], vec![Vector3::zeros(); count]);
         // From the tip inwards: total weight, and its moment about the root's origin.
-        let mut force = self.gravity * payload_kg;
+        let mut force = gravity * payload_kg;
         let mut moment = origin.cross(&force);
         for joint in (0..count).rev() {
             let (mass, centre) = centres[joint];
-            force += self.gravity * mass;
-            moment += centre.cross(&(self.gravity * mass));
+            force += gravity * mass;
+            moment += centre.cross(&(gravity * mass));
             forces[joint] = force;
             moments[joint] = moment - origins[joint].cross(&force);
         }
