@@ -282,6 +282,7 @@ fn diagnosis(stream: &mut Stream, readings: usize) -> Diagnosis {
     };
     Diagnosis {
         settings: Default::default(),
+        gravity_m_s2: None,
         verdict: Verdict::Ambiguous,
         sentence: "Something is there.".to_owned(),
         noise_floor: NoiseFloor { position_m: 1e-5 / 3.0, rotation_rad: None, source: NoiseSource::Declared },
@@ -301,8 +302,7 @@ fn diagnosis(stream: &mut Stream, readings: usize) -> Diagnosis {
                 explained_rms_m: 1e-5,
                 left_out: vec![LeftOut {
                     name: "4 kg".to_owned(),
-                    gravity_m_s2: None,
-        readings: 30,
+                    readings: 30,
                     geometry_rms_m: 1e-4,
                     explained_rms_m: stream.uniform(0.0, 1e-5),
                 }],
