@@ -242,6 +242,31 @@ impl<'a> Evidence<'a> {
         own.iter().map(sum).sum::<f64>() / self.level(model.drop)
     }
 
+    /// How much of `hypothesis`, one of `members`, those of them take back that fulfil `those`: as a coefficient (root mean square, where
+    /// it has several), nothing where they do not.
+    pub(super) fn cancelled(&self, members: &[(usize, usize)], those: impl Fn(usize) -> bool, hypothesis: usize) -> f64 {
+        let Some(model) = self.solve(members) else {
+            return 0.0;
+        };
+        let of = members.iter().flat_map(|(member, _)| self.candidates.columns(*member).map(move |_| *member));
+        let (mut square, mut product, mut sum, mut count) = (0.0, 0.0, 0.0, 0.0);
+        let values: Vec<(usize, usize, f64)> = of
+            .zip(&model.columns)
+            .zip(model.coefficients.iter())
+            .map(|((member, column), value)| (member, *column, *value))
+            .collect();
+        for (_, column, value) in values.iter().filter(|(member, ..)| *member == hypothesis) {
+            let row = self.marginal.row(*column);
+            for (member, other, of_other) in &values {
+                let both = value * row[*other] * of_other;
+                square += if *member == hypothesis { both } else { 0.0 };
+                product += if those(*member) { both } else { 0.0 };
+            }
+            (sum, count) = (sum + value * value, count + 1.0);
+        }
+        (-product / square.max(1e-300)).max(0.0) * libm::sqrt(sum / f64::max(count, 1.0))
+    }
+
     /// Logarithm of the marginal likelihood of the readings with `members`, up to what does not depend on members and on the
     /// geometry's prior: for the comparison of such priors. What the prior says counts as readings do, so that as many numbers are
     /// explained whatever it is.
@@ -436,5 +461,43 @@ mod tests {
             found[0].log_posterior
         };
         assert!(value(1.0) > value(-1.0) + 10.0);
+    }
+
+    /// Two columns that are nearly the same, one large against the other; and a third that has nothing to do with them.
+    #[test]
+    fn what_is_taken_back_counts_and_what_stands_beside_does_not() {
+        let of = |joint: usize| Hypothesis {
+            share: None,
+            kind: Some(Kind::JointCompliance),
+            location: Location { level: Level::Joint, index: Some(joint + 1) },
+            shape: Shape::Torque(Torque { joint }),
+            range: [0.5, 2.0],
+            spread: vec![1.0],
+            detail: String::new(),
+        };
+        let candidates = Candidates {
+            hypotheses: (0..3).map(of).collect(),
+            first: (0..3).collect(),
+            unit: vec![1.0; 3],
+            widest: vec![f64::INFINITY; 3],
+            log_odds: vec![-1.0; 3],
+            active: vec![true; 3],
+            scanned: 3,
+        };
+        let mut draws = stream(12, "test/cancelled");
+        let mut signatures = DMatrix::from_fn(400, 3, |_, _| 100.0 * draws.normal());
+        let alike = signatures.column(0) + signatures.column(1) * 0.1;
+        signatures.set_column(1, &alike);
+        let residual = signatures.column(0) * 2.0 - signatures.column(1) * 1.5 + signatures.column(2) * 3.0;
+        let products = test_marginal(&candidates, &signatures, &residual);
+        let (marginal, settings) = (products.marginal(), Settings::default());
+        let noise = NoisePrior { degrees_of_freedom: 100.0, level: 1.0 };
+        let evidence = Evidence { marginal: &marginal, candidates: &candidates, noise, settings: &settings };
+        let members = [(0, 3), (1, 3), (2, 3)];
+        // Of 2 the other takes 1.5 back.
+        let taken = evidence.cancelled(&members, |member| member == 1, 0);
+        assert!((taken - 1.5).abs() < 0.1, "{taken}");
+        let beside = evidence.cancelled(&members, |member| member == 2, 0);
+        assert!(beside < 0.3, "{beside}");
     }
 }

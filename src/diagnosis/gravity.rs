@@ -221,3 +221,73 @@ pub(super) fn sought(data: &Data<'_>) -> Result<Option<Vector3<f64>>, DiagnosisE
     let apart = chosen.0.dot(&first) < libm::cos(settings.apart_rad);
     Ok((chosen.1 > upright && explains && apart).then(|| chosen.0 * usual.norm()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arm::Arm;
+    use crate::diagnosis::outcome::NoiseSource;
+    use crate::diagnosis::tests::{readings, sensor, torque};
+    use crate::diagnosis::{Options, diagnose};
+    use crate::measurement::Measurement;
+
+    fn found(arm: &Arm, rows: &[Measurement]) -> Option<Vector3<f64>> {
+        let rows: Vec<&Measurement> = rows.iter().collect();
+        let options = Options { gravity: Gravity::Assumed, ..Options::new(NoiseSource::Declared) };
+        sought(&Data::new(arm, &sensor(), &rows, &options)).unwrap()
+    }
+
+    /// On a wall, under a ceiling and on a slope: the torques are those of the potential energy.
+    #[test]
+    fn gravity_is_found_where_an_arm_yields() {
+        for (gravity, within) in [([9.81, 0.0, 0.0], 1e-12), ([0.0, 0.0, 9.81], 1e-12), ([0.0, 5.886, -7.848], 0.05)] {
+            let gravity = Vector3::from(gravity);
+            let (arm, rows) = readings("test/gravity", |arm, joints, _, joint, payload| {
+                let mounted = Arm { gravity_in_base: gravity, ..arm.clone() };
+                let size = if joint == 1 { 2e-5 } else { 3e-5 };
+                if joint == 1 || joint == 3 { size * torque(&mounted, joints, joint, payload) } else { 0.0 }
+            });
+            let found = found(&arm, &rows).expect("it costs much");
+            assert!((found - gravity).norm() < within * 9.81, "{found}");
+        }
+    }
+
+    #[test]
+    fn who_stands_upright_is_left_there() {
+        type Off = fn(&Arm, &[f64], &[i8], usize, f64) -> f64;
+        let nothing: Off = |_, _, _, _, _| 0.0;
+        let yields: Off = |arm, joints, _, joint, payload| {
+            if joint == 1 { 2e-5 * torque(arm, joints, joint, payload) } else { 0.0 }
+        };
+        // As smooth in the angles as a torque, and none.
+        let eccentric: Off = |_, joints, _, joint, _| if joint < 4 { 2e-3 * (joints[joint] + 1.0).sin() } else { 0.0 };
+        let plays: Off = |_, _, approach, joint, _| 1e-3 * f64::from(approach[joint]);
+        for off in [nothing, yields, eccentric, plays] {
+            let (arm, rows) = readings("test/upright", off);
+            assert_eq!(found(&arm, &rows), None);
+        }
+    }
+
+    #[test]
+    fn a_diagnosis_takes_loads_as_gravity_has_them() {
+        let (arm, rows) = readings("test/wall", |arm, joints, _, joint, payload| {
+            let mounted = Arm { gravity_in_base: Vector3::new(0.0, 9.81, 0.0), ..arm.clone() };
+            if joint == 1 { 3e-5 * torque(&mounted, joints, joint, payload) } else { 0.0 }
+        });
+        let rows: Vec<&Measurement> = rows.iter().collect();
+        let options = Options { gravity: Gravity::Assumed, ..Options::new(NoiseSource::Declared) };
+        let conclusion = diagnose(&arm, &sensor(), &rows, &options).unwrap();
+        let [effect] = &conclusion.effects[..] else { panic!("{:?}", conclusion.effects) };
+        assert_eq!((effect.kind, effect.location.index), (Kind::JointCompliance, Some(2)));
+        assert!((effect.magnitude.value / 3e-5 - 1.0).abs() < 0.03, "{:?}", effect.magnitude);
+        let told = conclusion.gravity_m_s2.map(Vector3::from).unwrap();
+        assert!((told - Vector3::new(0.0, 9.81, 0.0)).norm() < 1e-9);
+        // The same where each reading says it.
+        let said: Vec<Measurement> =
+            rows.iter().map(|row| Measurement { gravity_m_s2: Some([0.0, 9.81, 0.0]), ..(*row).clone() }).collect();
+        let said: Vec<&Measurement> = said.iter().collect();
+        let other = diagnose(&arm, &sensor(), &said, &options).unwrap();
+        assert!(other.gravity_m_s2.is_none());
+        assert!((other.effects[0].magnitude.value / effect.magnitude.value - 1.0).abs() < 1e-9);
+    }
+}

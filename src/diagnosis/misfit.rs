@@ -3,7 +3,8 @@
 //! A shape without a name stands for a cause whose formula nobody knows, and is never quite that cause. What it leaves of it follows the
 //! same joint, and a named signature of that joint may fit it. So where there is a shape without a name, each name at its place has a rival
 //! that costs no prior odds, as it comes with the unknown cause: the same signature with the size that the difference may have
-//! (Kennedy and O'Hagan's discrepancy, embedded in the joint). A name stays where it does far more than such a difference.
+//! (Kennedy and O'Hagan's discrepancy, embedded in the joint). A name stays where it does far more than such a difference. What the shape
+//! takes back of it is no part of that: two that are large against each other describe one cause together.
 
 use super::evidence::Evidence;
 use super::search::{Belief, Found};
@@ -27,8 +28,10 @@ pub(super) fn doubt(evidence: &Evidence<'_>, mut found: Found) -> Found {
         let Some((unknown, _)) = others.iter().find(|(other, _)| beside(*other)).copied().filter(|_| named.kind.is_some()) else {
             continue;
         };
+        let cancelled = evidence.cancelled(&found.best, beside, *hypothesis);
         let square = evidence.settings.prior.misfit * evidence.energy(&others, beside)
-            / evidence.marginal.information(*hypothesis).max(1e-12);
+            / evidence.marginal.information(*hypothesis).max(1e-12)
+            + cancelled * cancelled;
         let as_misfit = evidence.log_gain(&others, *hypothesis, libm::sqrt(square.max(1e-12)));
         let as_cause = whole - evidence.log_posterior(&others);
         let share = 1.0 / (1.0 + libm::exp(as_misfit - as_cause));
