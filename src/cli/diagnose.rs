@@ -162,8 +162,9 @@ fn subject(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Subject
     let sensor = session::real_sensor(&real, &table.measurements);
     if table.fill_in_approach() {
         notes.push(
-            "no columns of approach: rows are taken to be in the order of measuring, and each joint to come from where the row before has \
-             it; where they are not, write `# order: unknown` under the header"
+            "no columns of approach: rows are taken to be in the order of measuring, and each joint to come straight from where the row \
+             before has it. Where it came from a side of the plan's choice, write approach1 …; where rows have no order, write `# order: \
+             unknown` under the header"
                 .to_owned(),
         );
     }

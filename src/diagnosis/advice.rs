@@ -76,7 +76,7 @@ mod tests {
     use crate::measurement::Measurement;
 
     fn one(kind: Option<Kind>) -> Candidate {
-        let location = Place { level: Level::Joint, index: Some(2), time_s: None };
+        let location = Place::of(Level::Joint, Some(2));
         Candidate { kind, location, probability: 0.5, detail: String::new() }
     }
 

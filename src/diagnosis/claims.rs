@@ -13,8 +13,10 @@ pub(super) fn claim(analysis: &Analysis<'_>, hypothesis: usize) -> Claim {
 /// Where it is and, of a step, when.
 pub(super) fn place(analysis: &Analysis<'_>, hypothesis: usize) -> Place {
     let of = &analysis.evidence.candidates.hypotheses[hypothesis];
-    let time_s = of.shape.row().and_then(|row| analysis.conditions.times.get(row).copied());
-    Place { level: of.location.level, index: of.location.index, time_s }
+    let row = of.shape.row().and_then(|place| analysis.conditions.in_time.get(place).copied());
+    let first = row.map(|row| analysis.measurements[row]);
+    let (time_s, row) = (first.map(|first| first.time_s), first.map(|first| first.index));
+    Place { time_s, row, ..Place::of(of.location.level, of.location.index) }
 }
 
 #[cfg(test)]
@@ -30,12 +32,13 @@ mod tests {
             |analysis| {
                 let play = hypothesis(&analysis, Some(Kind::Backlash), 3);
                 assert_eq!(claim(&analysis, play), (Some(Kind::Backlash), Location { level: Level::Joint, index: Some(3) }));
-                assert_eq!(place(&analysis, play), Place { level: Level::Joint, index: Some(3), time_s: None });
+                assert_eq!(place(&analysis, play), Place::of(Level::Joint, Some(3)));
                 // A reading every minute: the first reading after the step is the moment.
                 let mut steps = 0;
                 for (number, of) in analysis.evidence.candidates.hypotheses.iter().enumerate() {
                     if let Some(row) = of.shape.row() {
-                        assert_eq!(place(&analysis, number).time_s, Some(60.0 * row as f64));
+                        let place = place(&analysis, number);
+                        assert_eq!((place.time_s, place.row), (Some(60.0 * row as f64), Some(row)));
                         steps += 1;
                     }
                 }

@@ -20,8 +20,8 @@ pub(crate) struct Conditions {
     pub(crate) columns: Columns,
     /// What is missing.
     pub(crate) notes: Vec<Note>,
-    /// Time of each place in time, s.
-    pub(crate) times: Vec<f64>,
+    /// Row of each place in time.
+    pub(crate) in_time: Vec<usize>,
 }
 
 /// The conditions of `measurements`, whose geometry is `rows`, with the effects `present`, which answer to `loads`. `upright`: the joints
@@ -45,8 +45,8 @@ pub(crate) fn conditions(
     for (place, row) in in_time.iter().enumerate() {
         order[*row] = place;
     }
-    let times: Vec<f64> = in_time.iter().map(|row| measurements[*row].time_s).collect();
-    let (begin, end) = (times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0));
+    let time_of = |row: Option<&usize>| row.map_or(0.0, |row| measurements[*row].time_s);
+    let (begin, end) = (time_of(in_time.first()), time_of(in_time.last()));
     let time = end > begin;
 
     let approach = measurements.iter().all(|row| row.approach.len() == count);
@@ -150,7 +150,7 @@ pub(crate) fn conditions(
         upright,
         changes: if time { changes } else { Vec::new() },
     };
-    (Conditions { readings, columns, notes, times }, displacement)
+    (Conditions { readings, columns, notes, in_time }, displacement)
 }
 
 /// What came before, in time: loads and moves that a joint may remember.

@@ -44,7 +44,7 @@ pub(super) fn detectability(analysis: &Analysis<'_>, noise: f64) -> Detectabilit
     let (mut seen, mut all) = (0.0, 0.0);
     for ((kind, _, variants), power) in claims.into_iter().zip(powers) {
         let hypothesis = &candidates.hypotheses[variants[0]];
-        let place = Place { time_s: None, ..place(analysis, variants[0]) };
+        let place = Place { time_s: None, row: None, ..place(analysis, variants[0]) };
         let largest = hypothesis.range[1];
         all += 1.0;
         let value = power.least.filter(|least| least.is_finite() && *least < analysis.options.settings.power.beyond * largest);
@@ -77,7 +77,7 @@ pub(super) fn detectability(analysis: &Analysis<'_>, noise: f64) -> Detectabilit
             all += 1.0;
             undetectable.push(Hidden {
                 kind,
-                location: Place { level: kind.level(), index: Some(joint), time_s: None },
+                location: Place::of(kind.level(), Some(joint)),
                 minimum_detectable: MinimumDetectable { value: None, unit: kind.unit().to_owned() },
                 reason,
             });

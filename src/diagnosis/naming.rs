@@ -70,7 +70,7 @@ fn outliers(analysis: &Analysis<'_>, closing: &Closing<'_>, unknown: bool) -> Op
     let named = outliers.probability >= settings.decision.named && outliers.factor >= enough && !is_left_out && !scatters;
     named.then(|| Effect {
         kind: Kind::MeasurementOutliers,
-        location: Place { level: Level::Sensor, index: None, time_s: None },
+        location: Place::of(Level::Sensor, None),
         probability: outliers.probability,
         magnitude: Magnitude { value: outliers.share, unit: "1".to_owned(), ci95: outliers.share_ci95 },
         parameters: Parameters { factor: Some(outliers.factor), ..Parameters::default() },

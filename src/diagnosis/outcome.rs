@@ -161,8 +161,29 @@ pub struct Place {
     /// Number of the joint or link, from 1; absent where there is none.
     #[schemars(range(min = 1))]
     pub index: Option<usize>,
-    /// Change point, s (row index where the input has no time).
+    /// Change point, s (row of the input where that has no times).
     pub time_s: Option<f64>,
+    /// Of a change, the first row of the input after it, from 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub row: Option<usize>,
+}
+
+impl Place {
+    /// A place at which nothing changes.
+    #[must_use]
+    pub const fn of(level: Level, index: Option<usize>) -> Place {
+        Place { level, index, time_s: None, row: None }
+    }
+
+    /// When it changes, in words: by rows where the input has no times.
+    #[must_use]
+    pub fn when(&self) -> Option<String> {
+        match (self.time_s, self.row) {
+            (Some(time), Some(row)) if time == row as f64 => Some(format!("reading {}", row + 1)),
+            (Some(time), _) => Some(format!("{time:.0} s")),
+            (None, _) => None,
+        }
+    }
 }
 
 /// A magnitude.

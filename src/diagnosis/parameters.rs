@@ -20,7 +20,7 @@ pub(super) fn signature(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -
 
 /// The same by the names that results have for it.
 pub(super) fn parameters(analysis: &Analysis<'_>, signature: &Signature) -> Parameters {
-    let times = &analysis.conditions.times;
+    let times: Vec<f64> = analysis.conditions.in_time.iter().map(|row| analysis.measurements[*row].time_s).collect();
     let (begin, end) = (times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0));
     let share = |place: usize| times.get(place).map_or(1.0, |time| (time - begin) / (end - begin));
     // Between the last reading before and the first one after.

@@ -97,7 +97,7 @@ mod tests {
     use crate::diagnosis::outcome::{Magnitude, Parameters, Place};
     use crate::effects::Level;
 
-    const NOWHERE: Place = Place { level: Level::Joint, index: Some(2), time_s: None };
+    const NOWHERE: Place = Place::of(Level::Joint, Some(2));
 
     fn effect(kind: Kind, probability: f64, chosen: usize) -> Effect {
         Effect {

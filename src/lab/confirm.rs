@@ -512,7 +512,7 @@ mod tests {
         let value = coefficients[..hypothesis.shape.magnitude_width()].iter().map(|value| value * value).sum::<f64>().sqrt();
         outcome::Effect {
             kind,
-            location: Place { level: hypothesis.location.level, index: hypothesis.location.index, time_s: None },
+            location: Place::of(hypothesis.location.level, hypothesis.location.index),
             probability: 1.0,
             magnitude: Magnitude { value, unit: kind.unit().to_owned(), ci95: [value; 2] },
             parameters: parameters::named(&signature, |row| (row as f64 - 0.5) / (rows as f64 - 1.0)),

@@ -19,7 +19,7 @@ pub struct Table {
     pub joint_is_length: Vec<bool>,
     /// Columns of conditions: an identification does not use them, a diagnosis does.
     pub conditions: Vec<String>,
-    /// Whether rows are in the order of measuring, or have the times of it.
+    /// Whether the order of measuring is known: that of the rows, or of their times.
     pub in_order: bool,
 }
 
@@ -277,7 +277,7 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
         let said = line.trim_start().strip_prefix('#').map(|said| said.replace(char::is_whitespace, "").to_lowercase());
         said.is_some_and(|said| said == "order:unknown")
     };
-    let in_order = columns.contains(&Column::Time) || !text.lines().any(is_unknown);
+    let in_order = !text.lines().any(is_unknown);
     Ok(Table { measurements, joint_is_length, conditions, in_order })
 }
 

@@ -233,7 +233,7 @@ fn events(size: &Size) -> Vec<Event> {
 
 /// A diagnosis with something in every part, and with everything absent that may be.
 fn diagnosis(stream: &mut Stream, readings: usize) -> Diagnosis {
-    let place = |index, time_s| Place { level: Level::Joint, index, time_s };
+    let place = |index, time_s| Place { time_s, row: time_s.map(|_| 7), ..Place::of(Level::Joint, index) };
     let effect = |stream: &mut Stream, parameters| Effect {
         kind: Kind::Backlash,
         location: place(Some(3), None),
@@ -276,7 +276,7 @@ fn diagnosis(stream: &mut Stream, readings: usize) -> Diagnosis {
     let sets = [[Some(1), None], [Some(2), Some(4)]].map(|set| set.map(|index| candidate(stream, index)).to_vec());
     let least = |value, reason: &str| Undetectable {
         kind: Kind::BaseDrift,
-        location: Place { level: Level::Base, index: None, time_s: None },
+        location: Place::of(Level::Base, None),
         minimum_detectable: MinimumDetectable { value, unit: "m".to_owned() },
         reason: reason.to_owned(),
     };

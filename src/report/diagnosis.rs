@@ -170,8 +170,8 @@ fn shown(unit: &str) -> (&str, f64) {
 /// A place in words.
 pub(crate) fn place(place: &Place) -> String {
     let at = Location { level: place.level, index: place.index };
-    match place.time_s {
-        Some(time) => format!("{at}, {time:.0} s"),
+    match place.when() {
+        Some(when) => format!("{at}, {when}"),
         None => at.to_string(),
     }
 }

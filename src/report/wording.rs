@@ -127,8 +127,8 @@ fn words(kind: &str, location: &Location) -> String {
 /// The same with the moment, where there is one.
 fn at(kind: &str, place: &Place) -> String {
     let words = words(kind, &Location { level: place.level, index: place.index });
-    match place.time_s {
-        Some(time) => format!("{words} at {time:.0} s"),
+    match place.when() {
+        Some(when) => format!("{words} at {when}"),
         None => words,
     }
 }
@@ -348,7 +348,7 @@ mod tests {
     use crate::effects::Level;
 
     fn joint(index: usize) -> Place {
-        Place { level: Level::Joint, index: Some(index), time_s: None }
+        Place::of(Level::Joint, Some(index))
     }
 
     fn effect(kind: Kind, index: usize, probability: f64) -> Effect {
@@ -412,7 +412,7 @@ mod tests {
             "Several causes, not all settled (below 95 %): backlash of joint 3 (100 %), strain wave error of joint 1 (70 %); held-out RMS \
              89 µm with geometry, 65 µm with the causes."
         );
-        let step = Place { level: Level::Base, index: None, time_s: Some(61.4) };
+        let step = Place { time_s: Some(61.4), ..Place::of(Level::Base, None) };
         let candidate =
             |kind, location, probability| Candidate { kind, location, probability, detail: "not in the sentence".to_owned() };
         let set = vec![candidate(Some(Kind::BaseStep), step, 0.6), candidate(None, joint(2), 0.3)];

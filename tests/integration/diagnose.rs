@@ -61,7 +61,12 @@ fn a_recording_and_its_table_get_the_same_answer() {
         .collect();
     let bare = folder.path().join("bare.csv");
     fs::write(&bare, fewer.join("\n")).unwrap();
-    let blind = kincal(folder.path(), &["diagnose", bare.to_str().unwrap(), "--robot", &scene, "--json"]).json();
+    let diagnose = || kincal(folder.path(), &["diagnose", bare.to_str().unwrap(), "--robot", &scene, "--json"]).json();
+    // Sides follow from the order of the rows, unless they have none.
+    let notes = diagnose()["notes"].to_string();
+    assert!(notes.contains("no columns of approach") && !notes.contains("no approach directions"), "{notes}");
+    fs::write(&bare, format!("{}\n# order: unknown\n{}", fewer[0], fewer[1..].join("\n"))).unwrap();
+    let blind = diagnose();
     let notes = blind["notes"].to_string();
     assert!(notes.contains("no approach directions"), "{notes}");
     assert!(blind["effects"].as_array().unwrap().iter().all(|effect| effect["kind"] != "backlash"));
@@ -82,6 +87,10 @@ fn the_report_begins_with_the_verdict_and_bad_input_is_refused() {
     let table = folder.path().join("few.csv");
     fs::write(&table, "q1_rad,x_m,y_m,z_m\n0,1,0,0\n").unwrap();
     assert!(refused(&[table.to_str().unwrap()]).contains("give its nominal robot with --robot"));
+    assert!(refused(&[&case, "--gravity", "0,0,9.81"]).contains("a recording has its own; leave it out"));
+    let gravity = |said: &str| refused(&["scenes/tutorial.csv", "--robot", "scenes/tutorial.urdf", "--gravity", said]);
+    assert!(gravity("9.81,0").contains("--gravity 9.81,0: three numbers are needed, such as 0,0,-9.81"));
+    assert!(gravity("0,0,-1").contains("gravity is 1.000 m/s² long; 9.81 is needed: these seem to be multiples of g"));
 }
 
 /// Backlash of 120″ in joint 3 of the session of `scenes/gap.toml`: named, simulated, confirmed; from a table, too, with a robot that has

@@ -216,7 +216,7 @@ fn stated(kind: Kind, place: Option<usize>, quiet: &[Diagnosis]) -> Option<Curve
     };
     let first = quiet.first()?;
     let location = match place {
-        Some(place) => Place { level: kind.level(), index: Some(place + 1), time_s: None },
+        Some(place) => Place::of(kind.level(), Some(place + 1)),
         None => {
             let of_kind = |list: &[crate::diagnosis::outcome::Undetectable]| {
                 list.iter().filter(|entry| entry.kind == kind).cloned().collect::<Vec<_>>()
