@@ -70,8 +70,11 @@ pub struct RealCell {
     /// Link of the URDF that carries the target, if not its only leaf.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip_link: Option<String>,
-    /// Declared position noise, one sigma per axis, m.
+    /// Declared position noise, one sigma per axis, m; what is usual where nobody declared any.
     pub position_sigma_m: f64,
+    /// Whether nobody declared it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub noise_assumed: bool,
     /// Declared orientation noise, one sigma per axis, rad; unused where only positions were measured.
     #[serde(rename = "attitude_sigma_rad")]
     pub orientation_sigma_rad: f64,

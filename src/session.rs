@@ -157,6 +157,8 @@ pub struct RealArm {
     pub arm: Arm,
     /// Declared accuracy.
     pub sensor: Sensor,
+    /// Whether nobody declared it.
+    pub noise_assumed: bool,
     /// What was left out of the robot's file.
     pub notes: Vec<String>,
 }
@@ -194,7 +196,7 @@ pub fn real_arm(real: &RealCell, robot: (Arm, Vec<String>), measurements: &[Meas
     let fit: Vec<&Measurement> = measurements.iter().filter(|measurement| measurement.role == Role::Fit).collect();
     let (nominal, notes) = robot;
     let arm = align(&nominal, &sensor, &fit)?;
-    Ok(RealArm { robot: nominal, arm, sensor, notes })
+    Ok(RealArm { robot: nominal, arm, sensor, noise_assumed: real.noise_assumed, notes })
 }
 
 /// Identifies a real arm and tells the listener.
@@ -206,7 +208,11 @@ pub fn identify_real(
     measurements: &[Measurement],
     listener: &mut dyn Listener,
 ) -> Result<Identification, SessionError> {
-    let mut identification = identification::identify_real(&real.robot, &real.arm, &real.sensor, measurements)?;
+    let mut identification = if real.noise_assumed {
+        identification::identify_real_without_noise(&real.robot, &real.arm, &real.sensor, measurements)?
+    } else {
+        identification::identify_real(&real.robot, &real.arm, &real.sensor, measurements)?
+    };
     let frames = "nominal means: the measurement frame and the target fitted, the robot as its file says";
     identification.notes.push(frames.to_owned());
     identification.notes.extend(real.notes.iter().cloned());

@@ -47,8 +47,10 @@ fn from_table(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outc
     let robot = input::robot_of_table(&options.input, &options.robot)?;
     let (start, real) = input::described("identify", robot, &options.robot)?;
     let table = input::read_table(&options.input, &options.robot)?;
-    if !table.conditions.is_empty() {
-        output::note(global, &format!("note: an identification does not use {}", table.conditions.join(", ")));
+    let unused: Vec<&str> =
+        table.conditions.iter().map(String::as_str).filter(|name| !table::TO_IDENTIFY.contains(name)).collect();
+    if !unused.is_empty() {
+        output::note(global, &format!("note: an identification does not use {}", unused.join(", ")));
     }
     let (nominal, _) = session::real_robot(&start, &real).with_context(|| robot.display().to_string())?;
     input::check_units(&options.input, &table, &nominal)?;

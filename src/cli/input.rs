@@ -54,6 +54,7 @@ pub(crate) fn described(command: &str, robot: &Path, options: &RobotOptions) -> 
         base_link: options.base_link.clone(),
         tip_link: options.tip_link.clone(),
         position_sigma_m: options.position_noise_um.unwrap_or(POSITION_NOISE_UM) * 1e-6,
+        noise_assumed: options.position_noise_um.is_none(),
         orientation_sigma_rad: options.orientation_noise_deg.unwrap_or(ORIENTATION_NOISE_DEG).to_radians(),
     };
     Ok((Start { real: Some(real.clone()), ..session::start_event(command, &scene) }, real))

@@ -2,12 +2,11 @@
 //! tables say so; then what yields to load looks like joints that do not repeat.
 //!
 //! Whatever yields does so in proportion to the moments that gravity makes, and these are linear in it. So for every direction of gravity
-//! there is one linear problem, in which every joint yields and every link bends, geometry taken out, and its evidence says how likely the
-//! direction makes the readings.
+//! there is one linear problem, in which every joint yields and every link bends, geometry and errors of the joints' angles taken out, and its evidence says
+//! how likely the direction makes the readings.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
 
-use super::evidence::log_allowed;
 use super::rows::{self, DiagnosisError, Readings, Rows};
 use super::{Data, settings};
 use crate::effects::Kind;
@@ -24,6 +23,10 @@ pub enum Gravity {
     Assumed,
 }
 
+/// Harmonics of each joint's angle that its reading may be off by,
+const HARMONICS: u8 = 3;
+/// and their prior's sigma, rad: that of poor encoders.
+const ANGLE_ERROR: f64 = 2e-3;
 /// Directions that are tried before the best of them is made better.
 const DIRECTIONS: usize = 400;
 /// Widths of the search about the best of them, rad.
@@ -79,15 +82,29 @@ impl Yielding {
             }
             weighed
         };
-        let parameters: Vec<DVector<f64>> =
-            (0..rows.jacobian.ncols()).map(|parameter| weigh(&rows.jacobian.column(parameter).into_owned())).collect();
-        let jacobian = DMatrix::from_columns(&parameters);
+        let parameters = rows.jacobian.ncols();
+        let mut beside: Vec<DVector<f64>> = rows.jacobian.column_iter().map(|column| weigh(&column.into_owned())).collect();
+        // Encoders and gears err with the angle, as torques do; what such errors explain is no evidence of gravity.
+        for joint in (0..of_arm).filter(|joint| !mechanism.slides[*joint]) {
+            for order in 1..=HARMONICS {
+                for phase in [0.0, std::f64::consts::FRAC_PI_2] {
+                    let mut column = DVector::zeros(equations);
+                    for (row, joints) in joints.iter().enumerate() {
+                        let size = ANGLE_ERROR * libm::cos(f64::from(order) * joints[joint] - phase);
+                        column.rows_range_mut(rows.equations.of(row)).copy_from(&(rows.moved(row, joint) * size));
+                    }
+                    beside.push(weigh(&column));
+                }
+            }
+        }
+        let jacobian = DMatrix::from_columns(&beside);
         let residual = weigh(&rows.residual);
         // The prior of the geometry, about where it is now.
-        let precision = |parameter: usize| if rows.free[parameter] { 1e-6 } else { 1.0 };
+        let is_free = |parameter: usize| rows.free.get(parameter) == Some(&true);
         let mut normal = gram(&jacobian);
-        (0..parameters.len()).for_each(|at| normal[(at, at)] += precision(at));
-        let pull = DVector::from_fn(parameters.len(), |at, _| if rows.free[at] { 0.0 } else { rows.parameters[at] });
+        (0..beside.len()).for_each(|at| normal[(at, at)] += if is_free(at) { 1e-6 } else { 1.0 });
+        let pull =
+            DVector::from_fn(beside.len(), |at, _| if at >= parameters || is_free(at) { 0.0 } else { rows.parameters[at] });
         let cholesky = Cholesky::new(normal)?;
         let with_geometry = transposed_product(&jacobian, &columns);
         let geometry_with_residual = jacobian.tr_mul(&residual) - &pull;
@@ -120,18 +137,25 @@ impl Yielding {
             let precision = 1.0 / (size * size);
             let mut normal = products.clone();
             (0..count).for_each(|at| normal[(at, at)] += precision);
-            let cholesky = Cholesky::new(normal)?;
-            let found = cholesky.solve(&right);
-            let drop = right.dot(&found);
-            let after = (before - drop).max(1e-9 * before);
-            let factor = cholesky.l_dirty();
+            let factor = Cholesky::new(normal.clone())?.unpack();
             let determinant: f64 = (0..count).map(|at| 2.0 * libm::log(factor[(at, at)]) - libm::log(precision)).sum();
-            let inverse = cholesky.inverse();
-            let level = after / degrees;
             // Nothing yields upwards.
-            let signs: f64 =
-                (0..count).map(|at| log_allowed(found[at] / libm::sqrt(level * inverse[(at, at)]).max(1e-300))).sum();
-            Some((signs - 0.5 * determinant - 0.5 * degrees * libm::log(after / before), drop))
+            let mut down: Vec<usize> = (0..count).collect();
+            let drop = loop {
+                if down.is_empty() {
+                    break 0.0;
+                }
+                let part = right.select_rows(&down);
+                let found = Cholesky::new(normal.select_rows(&down).select_columns(&down))?.solve(&part);
+                let kept: Vec<usize> =
+                    down.iter().zip(found.iter()).filter(|(_, value)| **value > 0.0).map(|(at, _)| *at).collect();
+                if kept.len() == down.len() {
+                    break part.dot(&found);
+                }
+                down = kept;
+            };
+            let after = (before - drop).max(1e-9 * before);
+            Some((-0.5 * determinant - 0.5 * degrees * libm::log(after / before), drop))
         };
         let scales = data.options.settings.prior.scales.into_iter().filter_map(of_scale);
         scales.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::NEG_INFINITY, 0.0))
@@ -167,7 +191,7 @@ fn axes() -> impl Iterator<Item = Vector3<f64>> {
 }
 
 /// Gravity (in root, m/s²) as the readings have it, where that is far likelier than as the arm's file has it and explains most of what
-/// geometry leaves.
+/// geometry and yielding under that leave.
 ///
 /// # Errors
 /// If the readings cannot tell where the arm stands.
@@ -217,7 +241,7 @@ pub(super) fn sought(data: &Data<'_>) -> Result<Option<Vector3<f64>>, DiagnosisE
     let (upright, upright_drop) = yielding.evidence(data, &first);
     let (_, drop) = yielding.evidence(data, &chosen.0);
     let over_noise = (yielding.residual - yielding.degrees_of_freedom * data.noise.level).max(1e-12);
-    let explains = drop >= settings.explains * over_noise && upright_drop <= (1.0 - settings.explains) * drop;
+    let explains = drop - upright_drop >= settings.explains * (over_noise - upright_drop).max(0.0) && over_noise > upright_drop;
     let apart = chosen.0.dot(&first) < libm::cos(settings.apart_rad);
     Ok((chosen.1 > upright && explains && apart).then(|| chosen.0 * usual.norm()))
 }
@@ -247,7 +271,7 @@ mod tests {
                 let size = if joint == 1 { 2e-5 } else { 3e-5 };
                 if joint == 1 || joint == 3 { size * torque(&mounted, joints, joint, payload) } else { 0.0 }
             });
-            let found = found(&arm, &rows).expect("it costs much");
+            let found = found(&arm, &rows).unwrap_or_else(|| panic!("{gravity}"));
             assert!((found - gravity).norm() < within * 9.81, "{found}");
         }
     }

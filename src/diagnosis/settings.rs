@@ -238,8 +238,8 @@ settings! {
         wall: f64 = 7.0 => 0.0..=MANY,
         /// The same of any slope, the choice among all of them included.
         slope: f64 = 15.0 => 0.0..=MANY,
-        /// Share of what geometry leaves beyond the noise that yielding under it explains at least, and of which yielding of an upright arm
-        /// does not explain the rest.
+        /// Share of what geometry, errors of the joints' angles and yielding of an upright arm leave beyond the noise that yielding under
+        /// it explains at least.
         explains: f64 = 0.5 => SHARE,
         /// Angle from upright below which nothing is said, rad.
         apart_rad: f64 = 0.1 => 0.0..=3.2,

@@ -30,7 +30,7 @@ const WILD: f64 = 8.0;
 /// Residuals (RMS, m or rad) that no calibrated arm leaves, if the noise does not explain them.
 const ASTRAY: f64 = 0.02;
 /// Residuals so many times the declared noise make one doubt that it is this robot.
-const FOREIGN_ROBOT: f64 = 200.0;
+pub(super) const FOREIGN_ROBOT: f64 = 200.0;
 /// Below this probability of the residuals under the declared noise, the noise is taken to be larger than declared.
 const DECLARED_NOISE_REJECTED: f64 = 1e-3;
 
@@ -330,6 +330,7 @@ pub(super) fn conclude(
         held_out: held_out_errors,
         held_out_nominal,
         declared_noise: DeclaredNoise { position_m: noise.position_m, rotation_rad: noise.rotation_rad },
+        noise_estimated: false,
         residuals,
         notes,
     }

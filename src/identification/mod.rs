@@ -8,4 +8,4 @@ pub mod real;
 
 pub use alignment::align;
 pub use least_squares::{IdentificationError, fit_some, identify, identify_on};
-pub use real::identify_real;
+pub use real::{identify_real, identify_real_without_noise};

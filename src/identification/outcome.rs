@@ -36,6 +36,9 @@ pub struct Identification {
     pub held_out_nominal: Option<Errors>,
     /// How far a single reading of an exactly known pose would be off: the floor under every error above.
     pub declared_noise: DeclaredNoise,
+    /// Whether nobody declared it, so that it is estimated from what is left.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub noise_estimated: bool,
     /// Residuals of every configuration, in the order of measuring.
     pub residuals: Vec<Residual>,
     /// What was assumed or left out.

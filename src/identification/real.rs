@@ -4,7 +4,7 @@
 use nalgebra::{Cholesky, DMatrix};
 
 use super::geometry::{self, FRAME_SHIFT, FRAME_TURN, FREE, Geometry, Readings};
-use super::least_squares::{IdentificationError, MAX_STEPS, Plain, Solved, check_joints, conclude};
+use super::least_squares::{FOREIGN_ROBOT, IdentificationError, MAX_STEPS, Plain, Solved, check_joints, conclude};
 use super::outcome::Identification;
 use crate::arm::{Arm, Quantity};
 use crate::measurement::equations::Equations;
@@ -64,6 +64,50 @@ pub fn identify_real(
         list.join(", ")
     );
     identify_good(robot, aligned, sensor, &good, vec![note])
+}
+
+/// Smallest estimated noise over what is assumed first: below it readings are made by a computer, and any number would do.
+const LEAST_NOISE: f64 = 1e-3;
+
+/// As [`identify_real`], where nobody declared the noise: what is left of a first fit tells it, for positions and orientations in the
+/// proportion that `sensor` has them.
+///
+/// # Errors
+/// As [`identify_real`].
+pub fn identify_real_without_noise(
+    robot: &Arm,
+    aligned: &Arm,
+    sensor: &Sensor,
+    measurements: &[Measurement],
+) -> Result<Identification, IdentificationError> {
+    let first = identify_real(robot, aligned, sensor, measurements)?;
+    let Some(scale) = first.residual_scale.filter(|scale| scale.is_finite()) else {
+        return Ok(first);
+    };
+    let scale = scale.max(LEAST_NOISE);
+    let estimated = Sensor {
+        position_sigma_m: scale * sensor.position_sigma_m,
+        position_sigma_per_m: scale * sensor.position_sigma_per_m,
+        orientation_sigma_rad: sensor.orientation_sigma_rad.map(|sigma| scale * sigma),
+        ..sensor.clone()
+    };
+    let mut identification = identify_real(robot, aligned, &estimated, measurements)?;
+    identification.noise_estimated = true;
+    identification.notes.insert(
+        0,
+        format!(
+            "no noise was declared: it is estimated from what is left, {:.3} mm per axis, with all in it that is not modelled; \
+             --position-noise-um says what the sensor's is",
+            estimated.position_sigma_m * 1e3
+        ),
+    );
+    if scale > FOREIGN_ROBOT {
+        identification.notes.push(
+            "if the sensor is better than that: is it this robot, are the units right, and are the joint readings in the robot's order?"
+                .to_owned(),
+        );
+    }
+    Ok(identification)
 }
 
 /// Rows of `measurements` that are far off from what the fitted ones say together, and by how much (m).

@@ -17,7 +17,7 @@ pub struct Table {
     pub measurements: Vec<Measurement>,
     /// Of each joint column, whether its unit is a length.
     pub joint_is_length: Vec<bool>,
-    /// Columns of conditions: an identification does not use them, a diagnosis does.
+    /// Columns of conditions: an identification uses [`TO_IDENTIFY`] of them, a diagnosis all.
     pub conditions: Vec<String>,
     /// Whether the order of measuring is known: that of the rows, or of their times.
     pub in_order: bool,
@@ -80,6 +80,9 @@ fn free_fall(read: [f64; 3]) -> Result<[f64; 3], String> {
     let hint = if (length - 1.0).abs() <= OFF { ": these seem to be multiples of g" } else { "" };
     Err(format!("gravity is {length:.3} m/s² long; {FREE_FALL} is needed{hint}"))
 }
+
+/// Conditions that an identification uses: which base, and which point of the tool.
+pub const TO_IDENTIFY: [&str; 2] = ["session", "target"];
 
 /// A table that cannot be used.
 #[derive(Debug, thiserror::Error)]

@@ -110,6 +110,7 @@ fn events(size: &Size) -> Vec<Event> {
                 urdf: Some("<robot/>".to_owned()),
                 base_link: Some("base_link".to_owned()),
                 tip_link: Some("tool".to_owned()),
+                noise_assumed: true,
                 position_sigma_m: 2e-5,
                 orientation_sigma_rad: 1.0 / 3e4,
             }),
@@ -218,6 +219,7 @@ fn events(size: &Size) -> Vec<Event> {
         held_out: Some(errors(&mut stream, true)),
         held_out_nominal: None,
         declared_noise: DeclaredNoise { position_m: 5e-5, rotation_rad: None },
+        noise_estimated: true,
         residuals: (0..size.measurements)
             .map(|index| Residual {
                 index,
@@ -996,6 +998,7 @@ fn a_measurement_without_conditions_reads_as_without() {
         ambient_c: Some(20.0),
         payload_kg: Some(5.0),
         dwell_s: Some(2.0),
+        gravity_m_s2: Some([0.0, 0.0, -9.81]),
         session: Some("1".to_owned()),
         target: Some("A".to_owned()),
         unread: [false, false, true],

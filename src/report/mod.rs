@@ -168,13 +168,18 @@ pub fn identification(identification: &Identification) -> String {
         identification.rank,
         identification.parameters.len(),
         identification.equations,
-        identification.residual_scale.map(|scale| format!("; residuals {scale:.2} × declared noise")).unwrap_or_default(),
+        identification
+            .residual_scale
+            .filter(|_| !identification.noise_estimated)
+            .map(|scale| format!("; residuals {scale:.2} × declared noise"))
+            .unwrap_or_default(),
     ));
     let noise = &identification.declared_noise;
     if noise.position_m > 0.0 {
         text.push_str(&format!(
-            "Of every error above, {} mm RMS is the declared noise of the reading itself",
-            number(noise.position_m * 1e3)
+            "Of every error above, {} mm RMS is the {} noise of the reading itself",
+            number(noise.position_m * 1e3),
+            if identification.noise_estimated { "estimated" } else { "declared" }
         ));
         match noise.rotation_rad {
             Some(rotation) if rotation > 0.0 => text.push_str(&format!(" ({}°).\n", number(rotation.to_degrees()))),

@@ -251,6 +251,7 @@ fn events(particles: usize, count: usize, iterations: usize, held_out: usize) ->
         held_out: Some(errors(|r| &r.identified, verify)),
         held_out_nominal: Some(errors(|r| &r.nominal, verify)),
         declared_noise: DeclaredNoise { position_m: 5e-5, rotation_rad: Some(1e-4) },
+        noise_estimated: false,
         residuals: residuals.clone(),
         notes: vec!["orientation weighted by its declared sigma".to_owned()],
     }));

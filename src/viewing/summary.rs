@@ -112,6 +112,7 @@ impl Summary {
             identified.equations,
             identified
                 .residual_scale
+                .filter(|_| !identified.noise_estimated)
                 .map(|scale| format!(", residuals {} × declared noise", significant(scale, 3)))
                 .unwrap_or_default(),
         );

@@ -150,6 +150,11 @@ fn a_planned_session_is_measured_exported_identified_and_replayed() {
     let identified = kincal(out, &["identify", &path("arm8-measure.csv"), "--robot", &path("arm8.urdf"), "--json"]).ends(0);
     assert!(identified.stderr.contains("an identification does not use approach1"), "{}", identified.stderr);
     assert_eq!(identified.json()["held_out"]["count"], 100);
+    // Nobody declared its noise: it is estimated, and called so.
+    assert_eq!(identified.json()["noise_estimated"], true);
+    assert!(identified.stdout.contains("no noise was declared: it is estimated from what is left"), "{}", identified.stdout);
+    let declared = ["identify", &path("arm8-measure.csv"), "--robot", &path("arm8.urdf"), "--json", "--position-noise-um", "30"];
+    assert!(kincal(out, &declared).json()["noise_estimated"].is_null());
     kincal(out, &["replay", &recording]).ends(0);
     kincal(out, &["replay", &recording, "--truth", &truth]).ends(0);
 }
