@@ -32,12 +32,13 @@ pub struct Comparer {
 }
 
 /// Topics whose content comes of methods that change from version to version, and the first version that makes them as this one does.
-/// Everything else has been the same bits since 0.1.0.
+/// Everything else has been the same bits since 0.1.0, but for readings of links that bend: since 0.4.0 a bend about two axes twists no link,
+/// and only the truth tells which links bend.
 const MADE_SINCE: [(Topic, [u64; 3]); 4] = [
     (Topic::Identification, [0, 2, 0]),
     (Topic::ResidualsAfter, [0, 2, 0]),
     (Topic::PosesPredicted, [0, 2, 0]),
-    (Topic::Diagnosis, [0, 3, 0]),
+    (Topic::Diagnosis, [0, 4, 0]),
 ];
 
 /// Whether `version` makes `topic` by another method than this one.
