@@ -2,12 +2,12 @@
 //! integrated out, geometry integrated out before (see [`super::products`]).
 
 use std::f64::consts::LN_2;
-use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
+use super::fitted::Fitted;
 use super::products::Marginal;
-use super::settings::{Prior, SCALES, Settings};
+use super::settings::{Prior, Settings};
 use crate::effects::signature::library::Hypothesis;
 
 /// What is known of the noise beforehand: so many readings' worth (degrees of freedom) of a mean square, in declared sigmas.
@@ -40,7 +40,7 @@ pub(crate) struct Candidates {
 
 /// Logarithm of how much likelier a set of `count` effects is beforehand than their own odds say: any number of effects is as likely as
 /// any other, and so many there are are found in any order.
-fn log_multiplicity(count: usize) -> f64 {
+pub(super) fn log_multiplicity(count: usize) -> f64 {
     (1..=count).map(|number| libm::log(number as f64)).sum()
 }
 
@@ -178,14 +178,15 @@ impl<'a> Evidence<'a> {
     }
 
     /// Logarithm of the evidence over that of no effect.
-    fn log_ratio(&self, drop: f64, log_determinant: f64) -> f64 {
+    pub(super) fn log_ratio(&self, drop: f64, log_determinant: f64) -> f64 {
         let before = self.noise.degrees_of_freedom * self.noise.level + self.marginal.residual;
         let after = (before - drop).max(1e-9 * before);
         let degrees = self.noise.degrees_of_freedom + self.marginal.degrees_of_freedom;
         -0.5 * log_determinant - 0.5 * degrees * libm::log(after / before)
     }
 
-    fn level(&self, drop: f64) -> f64 {
+    /// Posterior mean of the noise's mean square, in declared sigmas, where members explain so much.
+    pub(super) fn level(&self, drop: f64) -> f64 {
         (self.noise.degrees_of_freedom * self.noise.level + self.marginal.residual - drop).max(1e-12)
             / (self.noise.degrees_of_freedom + self.marginal.degrees_of_freedom)
     }
@@ -306,87 +307,7 @@ impl<'a> Evidence<'a> {
     /// All sets that have one effect more than `members`.
     #[must_use]
     pub(crate) fn extensions(&self, members: &[(usize, usize)]) -> Vec<Extension> {
-        let (marginal, candidates) = (self.marginal, self.candidates);
-        let Some(base) = self.solve(members) else {
-            return Vec::new();
-        };
-        let prior = log_multiplicity(members.len() + 1)
-            + members
-                .iter()
-                .map(|(hypothesis, scale)| candidates.log_odds[*hypothesis] + libm::log(self.settings.prior.scale_shares[*scale]))
-                .sum::<f64>();
-        let rows: Vec<Arc<Vec<f64>>> = base.columns.iter().map(|column| marginal.row(*column)).collect();
-        let count = rows.len();
-        // Of the columns of one hypothesis: inner products with the members, and what these take of them.
-        let (mut cross, mut taken) = (Vec::new(), Vec::new());
-        let mut found = Vec::with_capacity(SCALES * candidates.hypotheses.len());
-        for hypothesis in 0..candidates.hypotheses.len() {
-            if !candidates.active[hypothesis] || members.iter().any(|(member, _)| candidates.exclude(*member, hypothesis)) {
-                continue;
-            }
-            let columns = candidates.columns(hypothesis);
-            let width = columns.len();
-            cross.clear();
-            taken.clear();
-            for column in columns.clone() {
-                let first = cross.len();
-                cross.extend(rows.iter().map(|row| row[column]));
-                for i in 0..count {
-                    let line = &base.inverse.as_slice()[i * count..(i + 1) * count];
-                    taken.push(line.iter().zip(&cross[first..]).map(|(a, b)| a * b).sum::<f64>());
-                }
-            }
-            let product = |a: usize, b: usize| -> f64 {
-                let (a, b) = (&cross[a * count..(a + 1) * count], &taken[b * count..(b + 1) * count]);
-                a.iter().zip(b).map(|(a, b)| a * b).sum()
-            };
-            let right = |i: usize| -> f64 {
-                let of_members: f64 =
-                    cross[i * count..(i + 1) * count].iter().zip(base.coefficients.iter()).map(|(a, b)| a * b).sum();
-                marginal.with_residual[columns.start + i] - of_members
-            };
-            let signed = one_signed(&candidates.hypotheses[hypothesis]);
-            let mut put = |scale: usize, added: f64, log_determinant: f64, first: f64, variance: f64| {
-                let drop = base.drop + added;
-                let mut total = prior + self.log_ratio(drop, base.log_determinant + log_determinant);
-                total += candidates.log_odds[hypothesis] + libm::log(self.settings.prior.scale_shares[scale]);
-                if signed {
-                    total += log_allowed(first / libm::sqrt(self.level(drop) * variance).max(1e-300));
-                }
-                found.push(Extension { member: (hypothesis, scale), log_posterior: total });
-            };
-            if width == 1 {
-                let (left, right) = (marginal.own(hypothesis, 0, 0) - product(0, 0), right(0));
-                for scale in 0..SCALES {
-                    let size = candidates.size(&self.settings.prior, hypothesis, scale);
-                    let precision = 1.0 / (size * size);
-                    let diagonal = left + precision;
-                    let coefficient = right / diagonal;
-                    put(scale, right * coefficient, libm::log(diagonal / precision), coefficient, 1.0 / diagonal);
-                }
-                continue;
-            }
-            let left = DMatrix::from_fn(width, width, |i, j| marginal.own(hypothesis, i, j) - product(i, j));
-            let right = DVector::from_fn(width, |i, _| right(i));
-            for scale in 0..SCALES {
-                let size = candidates.size(&self.settings.prior, hypothesis, scale);
-                let precision = 1.0 / (size * size);
-                let mut matrix = left.clone();
-                for i in 0..width {
-                    matrix[(i, i)] += precision;
-                }
-                let Some(cholesky) = Cholesky::new(matrix) else {
-                    continue;
-                };
-                let coefficients = cholesky.solve(&right);
-                let factor = cholesky.l_dirty();
-                let log_determinant =
-                    (0..width).map(|i| 2.0 * libm::log(factor[(i, i)])).sum::<f64>() - width as f64 * libm::log(precision);
-                let variance = if signed { cholesky.inverse()[(0, 0)] } else { 0.0 };
-                put(scale, right.dot(&coefficients), log_determinant, coefficients[0], variance);
-            }
-        }
-        found
+        Fitted::new(self, members).extensions(None)
     }
 }
 

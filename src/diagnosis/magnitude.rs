@@ -4,6 +4,7 @@ use super::Analysis;
 use super::evidence::Fit;
 use super::outcome::Magnitude;
 use super::settings::{Decision, SCALES};
+use crate::effects::signature::shape::Size;
 use crate::effects::{Kind, Load};
 use crate::numerics::distribution::{NORMAL_95, student_quantile};
 
@@ -11,10 +12,12 @@ use crate::numerics::distribution::{NORMAL_95, student_quantile};
 const RELATIVE: &str = "relative (no masses)";
 
 /// The best set fitted with the widest prior there is, so that it pulls next to nothing: what magnitudes and all else that effects have
-/// are told from.
+/// are told from. A free function keeps its own, as it has values where no reading tells them.
 pub(super) fn unpulled(analysis: &Analysis<'_>) -> Option<Fit> {
     let widest = SCALES - 1;
-    let members: Vec<(usize, usize)> = analysis.found.best.iter().map(|(member, _)| (*member, widest)).collect();
+    let free = |member: usize| analysis.evidence.candidates.hypotheses[member].shape.size() == Size::Rms;
+    let scale = |(member, own): &(usize, usize)| (*member, if free(*member) { *own } else { widest });
+    let members: Vec<(usize, usize)> = analysis.found.best.iter().map(scale).collect();
     analysis.evidence.fit(&members)
 }
 
@@ -25,8 +28,11 @@ pub(super) fn magnitude(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -
     let columns = analysis.evidence.candidates.columns(hypothesis);
     let width = of.shape.magnitude_width();
     let at: Vec<usize> = columns.take(width).filter_map(|column| fit.columns.iter().position(|known| *known == column)).collect();
-    let value = |i: usize| fit.coefficients[at[i]] * unit * of.spread[i];
-    let covariance = |i: usize, j: usize| fit.noise * fit.covariance[(at[i], at[j])] * unit * unit * of.spread[i] * of.spread[j];
+    let counts = counts(analysis, hypothesis);
+    let value = |i: usize| fit.coefficients[at[i]] * unit * of.spread[i] * counts[i];
+    let covariance = |i: usize, j: usize| {
+        fit.noise * fit.covariance[(at[i], at[j])] * unit * unit * of.spread[i] * of.spread[j] * counts[i] * counts[j]
+    };
     let degrees_of_freedom =
         (analysis.evidence.marginal.degrees_of_freedom + analysis.evidence.noise.degrees_of_freedom).max(1.0);
     let quantile = student_quantile(0.975, degrees_of_freedom).unwrap_or(NORMAL_95);
@@ -55,6 +61,16 @@ pub(super) fn magnitude(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -
     let true_length = libm::sqrt((length * length - (trace - along)).max(settings.shortened * length * length));
     let half = quantile * libm::hypot(libm::sqrt(along), model * length);
     Magnitude { value: true_length, unit: name, ci95: [(true_length - half).max(0.0), true_length + half] }
+}
+
+/// How much each coefficient of `hypothesis` counts in the length that is its magnitude: of a free function, as the readings tell of it.
+fn counts(analysis: &Analysis<'_>, hypothesis: usize) -> Vec<f64> {
+    let shape = &analysis.evidence.candidates.hypotheses[hypothesis].shape;
+    let width = shape.magnitude_width();
+    match shape.size() {
+        Size::Length => vec![1.0; width],
+        Size::Rms => analysis.evidence.marginal.shares(hypothesis).into_iter().map(libm::sqrt).collect(),
+    }
 }
 
 /// How well a signature is known, as a share of the magnitude (one sigma): what loads a joint hangs on levers that calibration cannot

@@ -15,6 +15,7 @@ mod confusion;
 pub(crate) mod deflection;
 mod detectability;
 mod evidence;
+mod fitted;
 mod gap;
 pub mod gravity;
 mod groups;

@@ -45,7 +45,7 @@ pub(super) fn name(analysis: &Analysis<'_>, closing: &Closing<'_>, unknown: bool
             location: place(analysis, *hypothesis),
             probability,
             magnitude,
-            parameters: parameters(analysis, &signature),
+            parameters: parameters(analysis, fit, *hypothesis, &signature),
             signature: Some(signature),
             held_out_rms_before_m: before,
             held_out_rms_after_m: now,

@@ -19,12 +19,19 @@ pub(super) fn signature(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -
 }
 
 /// The same by the names that results have for it.
-pub(super) fn parameters(analysis: &Analysis<'_>, signature: &Signature) -> Parameters {
+pub(super) fn parameters(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize, signature: &Signature) -> Parameters {
     let times: Vec<f64> = analysis.conditions.in_time.iter().map(|row| analysis.measurements[*row].time_s).collect();
     let (begin, end) = (times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0));
     let share = |place: usize| times.get(place).map_or(1.0, |time| (time - begin) / (end - begin));
     // Between the last reading before and the first one after.
-    named(signature, |row| 0.5 * (share(row.saturating_sub(1)) + share(row)))
+    let said = named(signature, |row| 0.5 * (share(row.saturating_sub(1)) + share(row)));
+    let candidates = analysis.evidence.candidates;
+    let sigma = |(column, spread): (usize, &f64)| {
+        let at = fit.columns.iter().position(|known| *known == column);
+        at.map_or(0.0, |at| libm::sqrt(fit.noise * fit.covariance[(at, at)]) * candidates.unit[hypothesis] * spread)
+    };
+    let sigmas = || candidates.columns(hypothesis).zip(&candidates.hypotheses[hypothesis].spread).map(sigma).collect();
+    Parameters { sigmas_rad: said.angles_rad.as_ref().map(|_| sigmas()), ..said }
 }
 
 /// `after`: share of the session that has passed between the reading before a place in time and the one at it.

@@ -10,12 +10,14 @@ use std::ops::Range;
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 
 use super::evidence::{Candidates, Evidence, NoisePrior, log_allowed, one_signed};
+use super::fitted::Fitted;
 use super::products::Marginal;
 use super::settings::{SCALES, Settings};
+use crate::effects::signature::shape::Size;
 use crate::numerics::transposed_product;
 use crate::seed::stream;
 
-/// Columns of all that is looked at.
+/// Columns of all that is looked at beside the truth.
 const COLUMNS: usize = 64;
 /// Differences of log posterior beyond which another member adds nothing.
 const NEGLIGIBLE: f64 = 9.0;
@@ -47,8 +49,8 @@ pub(crate) struct Bench<'a> {
     marginal: &'a Marginal<'a>,
     prior: NoisePrior,
     noise: f64,
-    /// What is found already, each with the scale of its prior.
-    found: &'a [(usize, usize)],
+    /// What is found already.
+    beside: Fitted<'a>,
     /// Of every hypothesis, the inverse of its inner products.
     inverses: Vec<DMatrix<f64>>,
     /// Draws of standard normals that all claims share, so that one can be compared with another.
@@ -60,11 +62,11 @@ struct Pool {
     /// Along the signal; these are quantiles, each once.
     along: f64,
     /// Of the columns.
-    columns: [f64; COLUMNS],
+    columns: Vec<f64>,
     /// Of all other equations together.
     rest: f64,
     /// Where the effect points.
-    direction: [f64; 6],
+    direction: Vec<f64>,
     /// Share of a turn beside a translation.
     turn: f64,
 }
@@ -106,7 +108,7 @@ struct Draw {
 impl<'a> Bench<'a> {
     /// For data with this `evidence`, with a noise of mean square `noise` (in declared sigmas), and with the effects `found`, beside which everything else has to show.
     #[must_use]
-    pub(crate) fn new(evidence: &Evidence<'a>, noise: f64, found: &'a [(usize, usize)]) -> Bench<'a> {
+    pub(crate) fn new(evidence: &Evidence<'a>, noise: f64, found: &[(usize, usize)]) -> Bench<'a> {
         let Evidence { marginal, candidates, noise: prior, settings } = *evidence;
         let inverses = (0..candidates.hypotheses.len())
             .map(|hypothesis| {
@@ -115,6 +117,7 @@ impl<'a> Bench<'a> {
                 firm(block).map_or_else(|| DMatrix::zeros(columns.len(), columns.len()), |cholesky| cholesky.inverse())
             })
             .collect();
+        let widest = (0..candidates.hypotheses.len()).map(|number| candidates.columns(number).len()).max().unwrap_or(1);
         let mut stream = stream(0, "power");
         let mut quantiles: Vec<f64> =
             (0..settings.power.draws).map(|draw| normal_quantile((draw as f64 + 0.5) / settings.power.draws as f64)).collect();
@@ -123,13 +126,22 @@ impl<'a> Bench<'a> {
             .into_iter()
             .map(|along| Pool {
                 along,
-                columns: std::array::from_fn(|_| stream.normal()),
+                columns: (0..COLUMNS + widest).map(|_| stream.normal()).collect(),
                 rest: stream.normal(),
-                direction: std::array::from_fn(|_| stream.normal()),
+                direction: (0..widest.max(6)).map(|_| stream.normal()).collect(),
                 turn: stream.uniform(TURNS[0], TURNS[1]),
             })
             .collect();
-        Bench { settings, candidates, marginal, prior, noise: noise.max(1e-12), found, inverses, pool }
+        Bench {
+            settings,
+            candidates,
+            marginal,
+            prior,
+            noise: noise.max(1e-12),
+            beside: Fitted::new(evidence, found),
+            inverses,
+            pool,
+        }
     }
 
     fn information(&self, hypothesis: usize) -> f64 {
@@ -242,12 +254,14 @@ impl<'a> Bench<'a> {
         count: usize,
     ) -> Option<World> {
         let apart = |member: usize| !variants.contains(&member) && !self.candidates.exclude(member, truth);
-        let beside: Vec<(usize, usize)> = self.found.iter().copied().filter(|(member, _)| apart(*member)).collect();
+        let gone: Vec<usize> =
+            (0..self.beside.members().len()).filter(|number| !apart(self.beside.members()[*number].0)).collect();
+        let beside: Vec<(usize, usize)> = self.beside.members().iter().copied().filter(|(member, _)| apart(*member)).collect();
         let taken = |other: usize| beside.iter().any(|(member, _)| self.candidates.exclude(*member, other));
         shares.retain(|(other, share)| *share >= self.settings.power.unlike && !taken(*other));
         shares.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let mut chosen = vec![truth];
-        let mut room = COLUMNS - self.candidates.columns(truth).len();
+        let mut room = COLUMNS;
         let mut left = self.settings.power.alike;
         for (other, _) in &shares {
             let (width, which) = (self.candidates.columns(*other).len(), usize::from(!variants.contains(other)));
@@ -261,24 +275,8 @@ impl<'a> Bench<'a> {
         chosen[1..].sort_by_key(|other| !variants.contains(other));
         let columns: Vec<usize> = chosen.iter().flat_map(|member| self.candidates.columns(*member)).collect();
         let size = columns.len();
-        let rows: Vec<_> = columns.iter().map(|column| self.marginal.row(*column)).collect();
-        let mut products = DMatrix::from_fn(size, size, |i, j| rows[i][columns[j]]);
         // What is found takes its part out of everything else.
-        let fitted: Vec<(usize, f64)> = beside
-            .iter()
-            .flat_map(|(member, scale)| {
-                let size = self.candidates.size(&self.settings.prior, *member, *scale);
-                self.candidates.columns(*member).map(move |column| (column, 1.0 / (size * size)))
-            })
-            .collect();
-        if !fitted.is_empty() {
-            let of_found: Vec<_> = fitted.iter().map(|(column, _)| self.marginal.row(*column)).collect();
-            let normal = DMatrix::from_fn(fitted.len(), fitted.len(), |i, j| {
-                of_found[i][fitted[j].0] + if i == j { fitted[i].1 } else { 0.0 }
-            });
-            let cross = DMatrix::from_fn(fitted.len(), size, |i, j| of_found[i][columns[j]]);
-            products -= cross.tr_mul(&Cholesky::new(normal)?.solve(&cross));
-        }
+        let products = self.beside.surviving(&columns, &gone);
         let mut axes = DMatrix::zeros(size, size);
         let mut members = Vec::with_capacity(chosen.len());
         let mut inverse = vec![[0.0; SCALES]; size];
@@ -344,12 +342,13 @@ impl<'a> Bench<'a> {
         let truth = &self.candidates.hypotheses[world.members[0].hypothesis];
         let unit = self.candidates.unit[world.members[0].hypothesis];
         let sigma = libm::sqrt(self.noise);
+        let shares = self.marginal.shares(world.members[0].hypothesis);
         // Row by row.
         let rows: Vec<f64> = (0..size).flat_map(|i| (0..=i).map(move |j| factor[(i, j)])).collect();
         let shown: Vec<f64> = (0..size).flat_map(|i| (0..width).map(move |j| products[(i, j)])).collect();
         let (mut direction, mut own, mut normal) = (vec![0.0; width], vec![0.0; width], vec![0.0; size]);
         for pool in self.pool.iter().skip(number).step_by(count) {
-            towards(&mut direction, world.members[0].signed, pool);
+            towards(&mut direction, world.members[0].signed, truth.shape.size(), &shares, pool);
             // Along the principal axes of the truth.
             for (i, own) in own.iter_mut().enumerate() {
                 *own = (0..width).map(|j| axes[(j, i)] * direction[j] / (unit * truth.spread[j])).sum();
@@ -383,13 +382,19 @@ impl<'a> Bench<'a> {
 }
 
 /// A direction in which a unit magnitude may point, as effects have it: a sign; a phase; a translation; a translation with a turn.
-fn towards(direction: &mut [f64], signed: bool, pool: &Pool) {
+/// `shares`: of the readings, what each part of a free function gets.
+fn towards(direction: &mut [f64], signed: bool, size: Size, shares: &[f64], pool: &Pool) {
     let width = direction.len();
     if width == 1 {
         direction[0] = if signed || pool.direction[0] > 0.0 { 1.0 } else { -1.0 };
         return;
     }
     direction.copy_from_slice(&pool.direction[..width]);
+    if size == Size::Rms {
+        let square: f64 = direction.iter().zip(shares).map(|(value, share)| value * value * share).sum();
+        direction.iter_mut().for_each(|value| *value /= libm::sqrt(square.max(1e-12)));
+        return;
+    }
     let scaled = |part: &mut [f64], length: f64| {
         let norm = libm::sqrt(part.iter().map(|value| value * value).sum::<f64>()).max(1e-12);
         part.iter_mut().for_each(|value| *value *= length / norm);

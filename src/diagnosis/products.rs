@@ -390,10 +390,29 @@ impl<'a> Marginal<'a> {
         self.own[self.products.first_own[hypothesis] + i * width + j]
     }
 
+    /// What survives of the columns of each hypothesis with each other, one hypothesis after the other, row by row.
+    #[must_use]
+    pub(crate) fn own_blocks(&self) -> &[f64] {
+        &self.own
+    }
+
+    /// Where those of `hypothesis` begin.
+    #[must_use]
+    pub(crate) fn first_own(&self, hypothesis: usize) -> usize {
+        self.products.first_own[hypothesis]
+    }
+
     /// Information about a coefficient of one of all columns of `hypothesis`: the trace of its block.
     #[must_use]
     pub(crate) fn information(&self, hypothesis: usize) -> f64 {
         (0..self.products.columns[hypothesis].len()).map(|i| self.own(hypothesis, i, i)).sum()
+    }
+
+    /// Of the information about `hypothesis`, the share of each of its columns.
+    #[must_use]
+    pub(crate) fn shares(&self, hypothesis: usize) -> Vec<f64> {
+        let all = self.information(hypothesis).max(1e-300);
+        (0..self.products.columns[hypothesis].len()).map(|i| self.own(hypothesis, i, i).max(0.0) / all).collect()
     }
 
     /// The geometry's change beside signatures with these coefficients (column and value).

@@ -39,9 +39,9 @@ pub(super) fn alike(one: &[Scatter], other: &[Scatter], settings: &settings::Sca
     one.len() == other.len() && one.iter().all(|a| other.iter().any(|b| near(a, b)))
 }
 
-/// Whether scatter may be mistaken for it: one of thousands of ripples and bumps.
+/// Whether scatter may be mistaken for it: one of thousands of ripples and bumps, or a function of the angle that is free to follow.
 pub(super) fn is_contested(of: &Hypothesis) -> bool {
-    of.kind == Some(Kind::StrainWaveError)
+    matches!(of.kind, Some(Kind::StrainWaveError | Kind::JointAngleMap))
         || matches!(of.shape, Shape::Harmonic(Harmonic { order, .. }) if order >= f64::from(*RIPPLES.start()))
         || matches!(of.shape, Shape::Nameless(Nameless::Bump(_)))
 }

@@ -7,6 +7,7 @@
 use std::collections::BTreeMap;
 
 use super::evidence::{Evidence, Extension};
+use super::fitted::Fitted;
 use crate::effects::{Kind, Location};
 use crate::seed::stream;
 
@@ -57,43 +58,39 @@ fn claim(evidence: &Evidence<'_>, hypothesis: usize) -> Claim {
 /// The likeliest set that can be reached from `start`, of `most` effects at most, and the logarithm of its posterior.
 #[must_use]
 pub(crate) fn climb(evidence: &Evidence<'_>, start: &[(usize, usize)], most: usize) -> (Vec<(usize, usize)>, f64) {
-    let mut members = start.to_vec();
-    let mut value = evidence.log_posterior(&members);
+    let mut fitted = Fitted::new(evidence, start);
+    let mut value = fitted.log_posterior();
     loop {
-        while members.len() < most {
-            match best_addition(evidence, &members) {
+        while fitted.members().len() < most {
+            match best_of(fitted.extensions(None)) {
                 Some((member, better)) if better > value + BETTER => {
-                    members.push(member);
+                    fitted.add(member);
                     value = better;
                 }
                 _ => break,
             }
         }
-        let exchanges = (0..members.len()).filter_map(|at| {
-            let mut fewer = members.clone();
-            let own = fewer.remove(at);
-            let without = (evidence.log_posterior(&fewer), fewer.clone());
-            let with = best_addition(evidence, &fewer).filter(|(member, _)| *member != own).map(|(member, better)| {
-                fewer.push(member);
-                (better, fewer)
-            });
+        let exchanges = (0..fitted.members().len()).filter_map(|at| {
+            let own = fitted.members()[at];
+            let without = (fitted.log_posterior_without(at), at, None);
+            let with = best_of(fitted.extensions(Some(at))).filter(|(member, _)| *member != own);
+            let with = with.map(|(member, better)| (better, at, Some(member)));
             with.into_iter().chain([without]).max_by(|a, b| a.0.total_cmp(&b.0))
         });
         match exchanges.max_by(|a, b| a.0.total_cmp(&b.0)) {
-            Some((better, other)) if better > value + BETTER => (value, members) = (better, other),
-            _ => return (members, value),
+            Some((better, at, other)) if better > value + BETTER => {
+                fitted.remove(at);
+                other.into_iter().for_each(|member| fitted.add(member));
+                value = better;
+            }
+            _ => return (fitted.members().to_vec(), value),
         }
     }
 }
 
-fn best_addition(evidence: &Evidence<'_>, members: &[(usize, usize)]) -> Option<((usize, usize), f64)> {
-    let mut found = evidence.extensions(members);
-    found.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior).then(a.member.cmp(&b.member)));
-    let exact = found.iter().take(evidence.settings.search.exact).map(|extension| {
-        let with: Vec<(usize, usize)> = members.iter().copied().chain([extension.member]).collect();
-        (extension.member, evidence.log_posterior(&with))
-    });
-    exact.max_by(|a, b| a.1.total_cmp(&b.1))
+fn best_of(extensions: Vec<Extension>) -> Option<((usize, usize), f64)> {
+    let likelier = |a: &Extension, b: &Extension| a.log_posterior.total_cmp(&b.log_posterior).then(b.member.cmp(&a.member));
+    extensions.into_iter().max_by(likelier).map(|best| (best.member, best.log_posterior))
 }
 
 /// Searches from `start` on. `most`: effects of a set at most.
@@ -121,15 +118,17 @@ fn walk(evidence: &Evidence<'_>, best: &[(usize, usize)], most: usize) -> Found 
     places.extend(vec![None; evidence.settings.search.spare.min(most.saturating_sub(best.len()))]);
     let mut of_place: Vec<Weights> = vec![Weights::new(); places.len()];
     let mut all: Weights = Weights::new();
+    let mut fitted = Fitted::new(evidence, best);
     let mut rounds = 0;
     for round in 0..evidence.settings.search.rounds {
         let mut of_round: Weights = Weights::new();
         let mut certain = true;
         for place in 0..places.len() {
-            let others: Vec<(usize, usize)> =
-                places.iter().enumerate().filter(|(other, _)| *other != place).filter_map(|(_, member)| *member).collect();
-            let nothing = evidence.log_posterior(&others);
-            let extensions = evidence.extensions(&others);
+            if let Some(member) = places[place] {
+                fitted.members().iter().position(|known| *known == member).into_iter().for_each(|at| fitted.remove(at));
+            }
+            let nothing = fitted.log_posterior();
+            let extensions = fitted.extensions(None);
             let top = extensions.iter().map(|extension| extension.log_posterior).fold(nothing, f64::max);
             let weight = |extension: &Extension| libm::exp(extension.log_posterior - top);
             let nothing = libm::exp(nothing - top);
@@ -149,6 +148,7 @@ fn walk(evidence: &Evidence<'_>, best: &[(usize, usize)], most: usize) -> Found 
                 }
             }
             places[place] = next;
+            next.into_iter().for_each(|member| fitted.add(member));
             certain &= here.values().map(|(probability, ..)| *probability).fold(nothing / total, f64::max)
                 > evidence.settings.search.certain;
             for (claim, (probability, _, hypothesis)) in here {
@@ -202,13 +202,11 @@ fn walk(evidence: &Evidence<'_>, best: &[(usize, usize)], most: usize) -> Found 
 fn in_order(evidence: &Evidence<'_>, members: &[(usize, usize)]) -> Vec<usize> {
     let mut left: Vec<usize> = (0..members.len()).collect();
     let mut ordered: Vec<usize> = Vec::new();
+    let mut fitted = Fitted::new(evidence, &[]);
     while !left.is_empty() {
-        let value = |at: usize| {
-            let with: Vec<(usize, usize)> = ordered.iter().chain([&at]).map(|at| members[*at]).collect();
-            evidence.log_posterior(&with)
-        };
-        let values: Vec<f64> = left.iter().map(|at| value(*at)).collect();
+        let values: Vec<f64> = left.iter().map(|at| fitted.log_posterior_with(members[*at])).collect();
         let next = (0..left.len()).max_by(|a, b| values[*a].total_cmp(&values[*b])).unwrap_or(0);
+        fitted.add(members[left[next]]);
         ordered.push(left.remove(next));
     }
     ordered

@@ -255,8 +255,6 @@ settings! {
         certain: f64 = 0.995 => SHARE,
         /// Places for causes that are not in the likeliest set.
         spare: usize = 1 => 0.0..=24.0,
-        /// Additions whose posterior is computed exactly: how signs shift beside a new member is left out at first.
-        exact: usize = 6 => 1.0..=100.0,
         /// Number (from 0) of the prior scale of a member for which none was chosen: that of worse arms than usual.
         stand_in_scale: usize = 1 => 0.0..=(SCALES - 1) as f64,
     }

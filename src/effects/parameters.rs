@@ -28,6 +28,15 @@ pub struct Parameters {
     pub row: Option<usize>,
     /// Of outliers: their noise over that of the others.
     pub factor: Option<f64>,
+    /// Of a map: the angles of the joint at which errors are given, rad; straight between them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angles_rad: Option<Vec<f64>>,
+    /// With them: what is to be added to the joint reading there, rad.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub errors_rad: Option<Vec<f64>>,
+    /// With them: one sigma of each; as large as is thought likely beforehand where no reading was near.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigmas_rad: Option<Vec<f64>>,
     /// Of a clearance: the share of the load (of the moment: over weight times length of the arm outboard) up to which friction holds
     /// the play in its middle.
     pub held: Option<f64>,

@@ -71,6 +71,10 @@ pub struct Values {
     pub travel: f64,
     /// kg
     pub excess: f64,
+    /// Angles of a table of errors, rising, rad.
+    pub angles: Vec<f64>,
+    /// Error at each of them, rad.
+    pub errors: Vec<f64>,
 }
 
 /// What a drift or a step of the measurement frame moves.

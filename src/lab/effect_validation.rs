@@ -161,6 +161,15 @@ pub fn cases(arm: &Arm) -> Vec<Case> {
         one("measurement_scale", "50 ppm".to_owned(), Effect::MeasurementScale { scale: 50e-6 }),
         one("measurement_outliers", "5 % of 10 sigma".to_owned(), Effect::MeasurementOutliers { share: 0.05, factor: 10.0 }),
         one(
+            "joint_angle_map",
+            joint(j2, "60 arcsec, a value every 20°"),
+            Effect::JointAngleMap {
+                joint: j2,
+                angles: (-10..=10).map(|step| f64::from(step) * 20_f64.to_radians()).collect(),
+                errors: (-10..=10).map(|step| 90.0 * ARCSEC * libm::sin(f64::from(step * step))).collect(),
+            },
+        ),
+        one(
             "worn_tooth_sector",
             joint(j2, "100 arcsec in 0.8 rad"),
             Effect::WornToothSector { joint: j2, depth: 100.0 * ARCSEC, centre: 0.3, half_width: 0.4 },
@@ -637,6 +646,16 @@ impl<'a> Statics<'a> {
                 }
                 Effect::StrainWaveError { joint, amplitude, ratio, phase } => {
                     turn(joint, amplitude * libm::cos(2.0 * ratio * q[joint] + phase));
+                }
+                Effect::JointAngleMap { joint, ref angles, ref errors } => {
+                    // Each line counts less the farther it is, up to the next one.
+                    let near = |(at, angle): (usize, &f64)| {
+                        let side = if q[joint] < *angle { at.checked_sub(1) } else { Some(at + 1) };
+                        let gap = side.and_then(|side| angles.get(side)).map_or(0.0, |next| (next - angle).abs());
+                        let off = (q[joint] - angle).abs();
+                        if off < gap || off == 0.0 { errors[at] * (1.0 - off / gap.max(1e-300)) } else { 0.0 }
+                    };
+                    turn(joint, angles.iter().enumerate().map(near).sum());
                 }
                 Effect::GearCoupling { joint, ratio_error, coupling, source } => {
                     turn(joint, ratio_error * q[joint] + coupling * q[source]);

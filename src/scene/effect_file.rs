@@ -73,6 +73,7 @@ fn values(file: &EffectToml, key: &str, place: Option<usize>, arm: &Arm) -> Chec
         let remedy = "an encoder off its axis has 1, a tilted one 2";
         return Err(Invalid::new(path("order"), order.to_string(), "1 or 2", remedy));
     }
+    let (angles, errors) = table(file, key)?;
     let at = place.unwrap_or(0);
     let source = match (&file.source, file.coupling_urad_per_rad) {
         (Some(name), _) => source(name, at, &path("source"), arm)?,
@@ -117,7 +118,33 @@ fn values(file: &EffectToml, key: &str, place: Option<usize>, arm: &Arm) -> Chec
         time_constant: given("time_constant_s", file.time_constant_s, positive, 1e6)?,
         travel: given("travel_deg", file.travel_deg, positive, 36e3)?.to_radians(),
         excess: signed("excess_kg", file.excess_kg, 1e3)?,
+        angles,
+        errors,
     })
+}
+
+/// Angles (rad, rising) and the error at each of them (rad).
+fn table(file: &EffectToml, key: &str) -> Checked<(Vec<f64>, Vec<f64>)> {
+    let (Some(angles), Some(errors)) = (&file.angles_deg, &file.errors_arcsec) else {
+        return Ok((Vec::new(), Vec::new()));
+    };
+    let path = format!("{key}.angles_deg");
+    if let Some(pair) = angles.windows(2).find(|pair| pair[0] >= pair[1]) {
+        let found = format!("{} before {}", pair[0], pair[1]);
+        return Err(Invalid::new(path, found, "angles that rise", "sort them, each once"));
+    }
+    if angles.len() < 2 || angles.len() != errors.len() {
+        let found = format!("{} angles and {} errors", angles.len(), errors.len());
+        return Err(Invalid::new(path, found, "two angles or more, and as many errors", "give one error for each angle"));
+    }
+    for (value, most, name) in angles
+        .iter()
+        .map(|angle| (angle, 36e3, "angles_deg"))
+        .chain(errors.iter().map(|error| (error, LARGEST_TURN_ARCSEC, "errors_arcsec")))
+    {
+        at_most(value.abs(), most, &format!("{key}.{name}"))?;
+    }
+    Ok((angles.iter().map(|angle| angle.to_radians()).collect(), errors.iter().map(|error| error * ARCSEC).collect()))
 }
 
 /// Growth of the whole arm, of one link, or of each link by its own number.

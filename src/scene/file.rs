@@ -668,6 +668,12 @@ pub struct EffectToml {
     /// Way over which the memory fades.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub travel_deg: Option<f64>,
+    /// Angles of a table of errors, rising.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angles_deg: Option<Vec<f64>>,
+    /// Error of the joint angle at each of them, straight between them and none beyond.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub errors_arcsec: Option<Vec<f64>>,
     /// True minus recorded payload.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub excess_kg: Option<f64>,

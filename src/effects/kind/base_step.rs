@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effects::signature::library::{Hypothesis, Site, twist_spread};
-use crate::effects::signature::shape::{Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape};
+use crate::effects::signature::shape::{Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, Size};
 use crate::effects::{Kind, Parameters, Values};
 
 /// \[6\] A twist of the base from a row on.
@@ -17,7 +17,7 @@ pub struct BaseStep {
 impl Follows for BaseStep {
     fn form(&self, _: bool) -> Form {
         // The magnitude of a twist is the length of its translation.
-        Form { columns: 6, of_magnitude: 3, needs: Recorded::Pose, unnamed: None }
+        Form { columns: 6, of_magnitude: 3, size: Size::Length, needs: Recorded::Pose, unnamed: None }
     }
 
     fn columns(&self, reading: &Reading, _: bool) -> Vec<Displacement> {

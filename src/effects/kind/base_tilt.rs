@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::arm::Arm;
 use crate::effects::signature::library::{Hypothesis, Site};
-use crate::effects::signature::shape::{Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, twist};
+use crate::effects::signature::shape::{Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, Size, twist};
 use crate::effects::{Kind, Parameters, Values};
 
 /// \[1\] A turn about the base's origin along the horizontal moment about it.
@@ -18,7 +18,7 @@ pub struct BaseTilt {}
 
 impl Follows for BaseTilt {
     fn form(&self, _: bool) -> Form {
-        Form { columns: 1, of_magnitude: 1, needs: Recorded::Pose, unnamed: None }
+        Form { columns: 1, of_magnitude: 1, size: Size::Length, needs: Recorded::Pose, unnamed: None }
     }
 
     fn columns(&self, reading: &Reading, _: bool) -> Vec<Displacement> {

@@ -6,7 +6,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effects::signature::library::{Hypothesis, Site};
-use crate::effects::signature::shape::{Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, from_one};
+use crate::effects::signature::shape::{
+    Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, Size, from_one,
+};
 use crate::effects::{Kind, Parameters, Values};
 
 /// \[1\] A joint turns by the angle of another, or of its own.
@@ -24,7 +26,7 @@ pub struct Ratio {
 
 impl Follows for Ratio {
     fn form(&self, _: bool) -> Form {
-        Form { columns: 1, of_magnitude: 1, needs: Recorded::Pose, unnamed: None }
+        Form { columns: 1, of_magnitude: 1, size: Size::Length, needs: Recorded::Pose, unnamed: None }
     }
 
     fn columns(&self, reading: &Reading, _: bool) -> Vec<Displacement> {

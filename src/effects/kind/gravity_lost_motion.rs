@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effects::signature::library::{Hypothesis, Site};
 use crate::effects::signature::shape::{
-    Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, across, from_one, little, seated,
+    Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, Size, across, from_one, little, seated,
 };
 use crate::effects::{Kind, Parameters, Values};
 
@@ -32,7 +32,7 @@ pub struct TorqueSign {
 
 impl Follows for TorqueSign {
     fn form(&self, _: bool) -> Form {
-        Form { columns: 1, of_magnitude: 1, needs: Recorded::Pose, unnamed: None }
+        Form { columns: 1, of_magnitude: 1, size: Size::Length, needs: Recorded::Pose, unnamed: None }
     }
 
     fn columns(&self, reading: &Reading, _: bool) -> Vec<Displacement> {
@@ -82,7 +82,7 @@ pub struct LeaningTorqueSign {
 
 impl Follows for LeaningTorqueSign {
     fn form(&self, _: bool) -> Form {
-        Form { columns: 1, of_magnitude: 1, needs: Recorded::Pose, unnamed: None }
+        Form { columns: 1, of_magnitude: 1, size: Size::Length, needs: Recorded::Pose, unnamed: None }
     }
 
     fn columns(&self, reading: &Reading, _: bool) -> Vec<Displacement> {

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effects::signature::library::{Hypothesis, Site};
 use crate::effects::signature::shape::{
-    Coefficients, Displacement, Family, Follows, Form, Named, Reading, Recorded, Shape, Unnamed, from_one,
+    Coefficients, Displacement, Family, Follows, Form, Named, Reading, Recorded, Shape, Size, Unnamed, from_one,
 };
 use crate::effects::{Kind, Parameters, Values};
 
@@ -27,7 +27,13 @@ pub struct Harmonic {
 impl Follows for Harmonic {
     fn form(&self, _: bool) -> Form {
         let family = if self.order >= f64::from(*RIPPLES.start()) { Family::Ripple } else { Family::Harmonic };
-        Form { columns: 2, of_magnitude: 2, needs: Recorded::Pose, unnamed: Some(Unnamed { family, contains: None, near: None }) }
+        Form {
+            columns: 2,
+            of_magnitude: 2,
+            size: Size::Length,
+            needs: Recorded::Pose,
+            unnamed: Some(Unnamed { family, contains: None, near: None }),
+        }
     }
 
     fn columns(&self, reading: &Reading, _: bool) -> Vec<Displacement> {
@@ -66,7 +72,7 @@ pub struct TwoHarmonics {
 impl Follows for TwoHarmonics {
     fn form(&self, _: bool) -> Form {
         // The magnitude is that of the first harmonic.
-        Form { columns: 4, of_magnitude: 2, needs: Recorded::Pose, unnamed: None }
+        Form { columns: 4, of_magnitude: 2, size: Size::Length, needs: Recorded::Pose, unnamed: None }
     }
 
     fn columns(&self, reading: &Reading, orientation: bool) -> Vec<Displacement> {

@@ -6,7 +6,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effects::signature::library::{Hypothesis, Site};
-use crate::effects::signature::shape::{Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, from_one};
+use crate::effects::signature::shape::{
+    Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, Size, from_one,
+};
 use crate::effects::{Kind, Parameters, Values};
 
 /// \[1\] A joint turns with the temperature of its link.
@@ -20,7 +22,7 @@ pub struct Warmth {
 
 impl Follows for Warmth {
     fn form(&self, _: bool) -> Form {
-        Form { columns: 1, of_magnitude: 1, needs: Recorded::Temperatures, unnamed: None }
+        Form { columns: 1, of_magnitude: 1, size: Size::Length, needs: Recorded::Temperatures, unnamed: None }
     }
 
     fn columns(&self, reading: &Reading, _: bool) -> Vec<Displacement> {

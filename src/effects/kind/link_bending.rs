@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effects::signature::library::{Hypothesis, Site};
 use crate::effects::signature::shape::{
-    Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, from_one, twist,
+    Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, Size, from_one, twist,
 };
 use crate::effects::{Kind, Parameters, Values};
 
@@ -26,7 +26,7 @@ pub struct MomentAcross {
 
 impl Follows for MomentAcross {
     fn form(&self, _: bool) -> Form {
-        Form { columns: 1, of_magnitude: 1, needs: Recorded::Pose, unnamed: None }
+        Form { columns: 1, of_magnitude: 1, size: Size::Length, needs: Recorded::Pose, unnamed: None }
     }
 
     fn columns(&self, reading: &Reading, _: bool) -> Vec<Displacement> {
@@ -60,7 +60,7 @@ pub struct Beam {
 
 impl Follows for Beam {
     fn form(&self, _: bool) -> Form {
-        Form { columns: 1, of_magnitude: 1, needs: Recorded::Pose, unnamed: None }
+        Form { columns: 1, of_magnitude: 1, size: Size::Length, needs: Recorded::Pose, unnamed: None }
     }
 
     fn columns(&self, reading: &Reading, orientation: bool) -> Vec<Displacement> {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effects::signature::library::{Hypothesis, Site};
 use crate::effects::signature::shape::{
-    Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, from_one_or_none, twist,
+    Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, Size, from_one_or_none, twist,
 };
 use crate::effects::{Foot, Kind, Parameters, Values};
 
@@ -23,7 +23,7 @@ pub struct Growth {
 
 impl Follows for Growth {
     fn form(&self, _: bool) -> Form {
-        Form { columns: 1, of_magnitude: 1, needs: Recorded::Temperatures, unnamed: None }
+        Form { columns: 1, of_magnitude: 1, size: Size::Length, needs: Recorded::Temperatures, unnamed: None }
     }
 
     fn columns(&self, reading: &Reading, _: bool) -> Vec<Displacement> {
@@ -54,7 +54,7 @@ pub struct GrowthOnFoot {
 
 impl Follows for GrowthOnFoot {
     fn form(&self, _: bool) -> Form {
-        Form { columns: 1, of_magnitude: 1, needs: Recorded::Temperatures, unnamed: None }
+        Form { columns: 1, of_magnitude: 1, size: Size::Length, needs: Recorded::Temperatures, unnamed: None }
     }
 
     fn columns(&self, reading: &Reading, _: bool) -> Vec<Displacement> {

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effects::signature::library::{Hypothesis, Site};
 use crate::effects::signature::shape::{
-    Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, from_one, little, seated, twist,
+    Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, Size, from_one, little, seated, twist,
 };
 use crate::effects::{Kind, Parameters, Values};
 
@@ -39,7 +39,7 @@ pub struct ForceAcrossSign {
 
 impl Follows for ForceAcrossSign {
     fn form(&self, _: bool) -> Form {
-        Form { columns: 1, of_magnitude: 1, needs: Recorded::Pose, unnamed: None }
+        Form { columns: 1, of_magnitude: 1, size: Size::Length, needs: Recorded::Pose, unnamed: None }
     }
 
     fn columns(&self, reading: &Reading, _: bool) -> Vec<Displacement> {

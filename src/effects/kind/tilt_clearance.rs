@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effects::signature::library::{Hypothesis, Site};
 use crate::effects::signature::shape::{
-    Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, from_one, little, seated,
+    Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, Size, from_one, little, seated,
 };
 use crate::effects::{Kind, Parameters, Values};
 
@@ -28,7 +28,7 @@ pub struct MomentAcrossSign {
 
 impl Follows for MomentAcrossSign {
     fn form(&self, _: bool) -> Form {
-        Form { columns: 1, of_magnitude: 1, needs: Recorded::Pose, unnamed: None }
+        Form { columns: 1, of_magnitude: 1, size: Size::Length, needs: Recorded::Pose, unnamed: None }
     }
 
     fn columns(&self, reading: &Reading, _: bool) -> Vec<Displacement> {

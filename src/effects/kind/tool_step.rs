@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effects::signature::library::{Hypothesis, Site, twist_spread};
-use crate::effects::signature::shape::{Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape};
+use crate::effects::signature::shape::{Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, Size};
 use crate::effects::{Kind, Parameters, Values};
 
 /// \[3, 6 with orientations\] A twist of the tool from a row on.
@@ -17,7 +17,13 @@ pub struct ToolStep {
 impl Follows for ToolStep {
     fn form(&self, orientation: bool) -> Form {
         // The magnitude of a twist is the length of its translation.
-        Form { columns: if orientation { 6 } else { 3 }, of_magnitude: 3, needs: Recorded::Pose, unnamed: None }
+        Form {
+            columns: if orientation { 6 } else { 3 },
+            of_magnitude: 3,
+            size: Size::Length,
+            needs: Recorded::Pose,
+            unnamed: None,
+        }
     }
 
     fn columns(&self, reading: &Reading, orientation: bool) -> Vec<Displacement> {

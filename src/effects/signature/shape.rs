@@ -41,12 +41,23 @@ pub(in crate::effects) trait Named: Follows {
 pub(in crate::effects) struct Form {
     /// Number of columns.
     pub(in crate::effects) columns: usize,
-    /// How many of them, from the first, have the magnitude as their length.
+    /// How many of them, from the first, tell the magnitude.
     pub(in crate::effects) of_magnitude: usize,
+    /// What of these it is.
+    pub(in crate::effects) size: Size,
     /// What a reading must have besides its pose.
     pub(in crate::effects) needs: Recorded,
     /// What it is where it has no name. `None` for shapes that always have one.
     pub(in crate::effects) unnamed: Option<Unnamed>,
+}
+
+/// How coefficients tell a magnitude.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Size {
+    /// Their length.
+    Length,
+    /// Of a free function of something, its root mean square over the readings.
+    Rms,
 }
 
 /// What a shape without a name is.
@@ -296,10 +307,16 @@ impl Shape {
         self.follows().form(orientation).columns
     }
 
-    /// Number of columns, from the first, whose coefficients have the magnitude as their length.
+    /// Number of columns, from the first, whose coefficients tell the magnitude.
     #[must_use]
     pub fn magnitude_width(&self) -> usize {
         self.follows().form(false).of_magnitude
+    }
+
+    /// How they do.
+    #[must_use]
+    pub fn size(&self) -> Size {
+        self.follows().form(false).size
     }
 
     /// Whether nobody knows to which side this is seated at `reading`: the load is next to nothing, and friction or a base that is not

@@ -25,6 +25,8 @@ mod gravity_lost_motion;
 #[cfg(feature = "simulator")]
 mod hardening_stiffness;
 #[cfg(feature = "simulator")]
+mod joint_angle_map;
+#[cfg(feature = "simulator")]
 mod joint_compliance;
 #[cfg(feature = "simulator")]
 mod joint_eccentricity;
@@ -67,6 +69,7 @@ use crate::simulation::physics::clearance::Clearance;
 use crate::simulation::physics::drive_train::{Memory, WaveGenerator, WornSector};
 #[cfg(feature = "simulator")]
 use crate::simulation::physics::mechanism::{Checks, Mechanisms};
+use crate::statistics;
 
 /// An un-modelled effect with its place and its magnitude. Joints and links count from 0 here; link `i` moves with joint `i`.
 #[derive(Clone, Debug, PartialEq)]
@@ -201,6 +204,15 @@ pub enum Effect {
         /// Relative error.
         scale: f64,
     },
+    /// Graduation or teeth are off here and there.
+    JointAngleMap {
+        /// Joint.
+        joint: usize,
+        /// Angles of the joint, rising, rad.
+        angles: Vec<f64>,
+        /// Error at each of them, straight between them and none beyond, rad.
+        errors: Vec<f64>,
+    },
     /// Some readings have a larger noise.
     MeasurementOutliers {
         /// Share of the readings, 0 to 1.
@@ -293,6 +305,7 @@ impl Effect {
             }
             Effect::BaseTilt { compliance } => base_tilt::add(parts, checks, compliance),
             Effect::ToolStep { translation, rotation, after } => tool_step::add(parts, checks, (translation, rotation), after),
+            Effect::JointAngleMap { joint, ref angles, ref errors } => joint_angle_map::add(parts, checks, joint, angles, errors),
             Effect::MeasurementScale { scale } => measurement_scale::check(checks, scale),
             Effect::MeasurementOutliers { share, factor } => measurement_outliers::check(checks, share, factor),
             Effect::WornToothSector { joint, depth, centre, half_width } => {
@@ -349,6 +362,7 @@ impl Effect {
             Kind::BaseStep => Effect::BaseStep { moves, translation, rotation, after },
             Kind::BaseTilt => Effect::BaseTilt { compliance },
             Kind::ToolStep => Effect::ToolStep { translation, rotation, after },
+            Kind::JointAngleMap => Effect::JointAngleMap { joint, angles: values.angles.clone(), errors: values.errors.clone() },
             Kind::MeasurementScale => Effect::MeasurementScale { scale: values.scale },
             Kind::MeasurementOutliers => Effect::MeasurementOutliers { share: values.share, factor: values.factor },
             Kind::WornToothSector => {
@@ -419,6 +433,10 @@ impl Effect {
                 rotation: turn(magnitude, stream),
                 after: stream.uniform(0.25, 0.75),
             },
+            Kind::JointAngleMap => {
+                let (angles, errors) = graduation(magnitude, stream);
+                Effect::JointAngleMap { joint, angles, errors }
+            }
             Kind::MeasurementScale => Effect::MeasurementScale { scale: sign(stream) * magnitude },
             Kind::MeasurementOutliers => Effect::MeasurementOutliers { share: magnitude, factor: stream.uniform(6.0, 20.0) },
             Kind::WornToothSector => {
@@ -523,6 +541,9 @@ impl Effect {
             Effect::ToolStep { translation, rotation, after } => {
                 twist(Kind::ToolStep, translation, rotation).with("after", after)
             }
+            Effect::JointAngleMap { joint, ref errors, .. } => {
+                at(Kind::JointAngleMap, joint, statistics::rms(errors.iter().copied()))
+            }
             Effect::MeasurementScale { scale } => of(Kind::MeasurementScale, None, scale),
             Effect::MeasurementOutliers { share, factor } => of(Kind::MeasurementOutliers, None, share).with("factor", factor),
             Effect::WornToothSector { joint, depth, centre, half_width } => {
@@ -580,6 +601,24 @@ impl Growing {
     pub fn of(link: Option<usize>) -> Growing {
         link.map_or(Growing::Arm(Foot::Own), Growing::Link)
     }
+}
+
+/// Orders of a drawn graduation error: those below are an eccentricity's.
+const GRADUATION_ORDERS: std::ops::RangeInclusive<u8> = 3..=30;
+
+/// Angles over two turns, a degree apart, and errors there that come again after each turn: waves of all [`GRADUATION_ORDERS`], the finer
+/// the smaller, with `rms`, rad.
+fn graduation(rms: f64, stream: &mut Stream) -> (Vec<f64>, Vec<f64>) {
+    let waves: Vec<(f64, f64, f64)> = GRADUATION_ORDERS
+        .map(|order| (f64::from(order), stream.normal() / f64::from(order).sqrt(), stream.normal() / f64::from(order).sqrt()))
+        .collect();
+    let scale = rms / libm::sqrt(0.5 * waves.iter().map(|(_, a, b)| a * a + b * b).sum::<f64>());
+    let angles: Vec<f64> = (-360..=360).map(|degree| f64::from(degree).to_radians()).collect();
+    let error = |angle: &f64| -> f64 {
+        waves.iter().map(|(order, a, b)| scale * (a * libm::cos(order * angle) + b * libm::sin(order * angle))).sum()
+    };
+    let errors = angles.iter().map(error).collect();
+    (angles, errors)
 }
 
 /// Whose motion leaks into `joint` of an arm of so many `joints`: `None` for its own gear in half of the cases, else a neighbour, whose

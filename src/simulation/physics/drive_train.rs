@@ -15,6 +15,7 @@ pub(in crate::simulation) struct Drive {
     pub(in crate::simulation) ratio_error: f64,
     /// Joints whose motion leaks, and how much of it.
     pub(in crate::simulation) leaks: Vec<(usize, f64)>,
+    pub(in crate::simulation) graduations: Vec<Graduation>,
     pub(in crate::simulation) worn: Vec<WornSector>,
     pub(in crate::simulation) memories: Vec<Memory>,
     /// Drift of the zero with the temperature of the link that the joint moves, rad/K.
@@ -94,6 +95,31 @@ pub(in crate::simulation) struct WaveGenerator {
     pub(in crate::simulation) phase: f64,
 }
 
+/// Lines of a graduation, or teeth, that are not where they should be.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::simulation) struct Graduation {
+    /// Rising, rad.
+    pub(in crate::simulation) angles: Vec<f64>,
+    /// How far the output stands beyond each of them, rad.
+    pub(in crate::simulation) errors: Vec<f64>,
+}
+
+impl Graduation {
+    /// How far the output stands beyond `angle`, rad: straight from one to the next, and nothing beyond the ends.
+    fn beyond(&self, angle: f64) -> f64 {
+        let next = self.angles.partition_point(|known| *known <= angle);
+        if next == self.angles.len() && self.angles.last() == Some(&angle) {
+            return self.errors[next - 1];
+        }
+        if next == 0 || next == self.angles.len() {
+            return 0.0;
+        }
+        let [from, to] = [self.angles[next - 1], self.angles[next]];
+        let share = (angle - from) / (to - from);
+        self.errors[next - 1] * (1.0 - share) + self.errors[next] * share
+    }
+}
+
 /// A sector of worn teeth: the output stands behind where it should, most in the middle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::simulation) struct WornSector {
@@ -154,9 +180,10 @@ impl Drive {
         let encoders: f64 = self.encoders.iter().map(|encoder| encoder.beyond(q)).sum();
         let waves: f64 = self.wave_generators.iter().map(|w| w.amplitude * libm::cos(2.0 * (w.ratio * q) + w.phase)).sum();
         let leaks: f64 = self.leaks.iter().map(|(source, coupling)| coupling * conditions.joints[*source]).sum();
+        let graduations: f64 = self.graduations.iter().map(|graduation| graduation.beyond(q)).sum();
         let worn: f64 = self.worn.iter().map(|sector| sector.behind(q)).sum();
         let memories: f64 = self.memories.iter().map(|memory| memory.state(joint, conditions)).sum();
         let drift = self.zero_drift * conditions.rise_k[joint + 1];
-        q + (encoders + waves + self.ratio_error * q + leaks - worn + memories + drift)
+        q + (encoders + waves + self.ratio_error * q + leaks + graduations - worn + memories + drift)
     }
 }

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effects::signature::library::{Hypothesis, Site};
-use crate::effects::signature::shape::{Displacement, Family, Follows, Form, Reading, Recorded, Unnamed};
+use crate::effects::signature::shape::{Displacement, Family, Follows, Form, Reading, Recorded, Size, Unnamed};
 use crate::effects::{Level, Location};
 
 use super::Nameless;
@@ -21,6 +21,7 @@ impl Follows for AllYield {
         Form {
             columns: 2,
             of_magnitude: 2,
+            size: Size::Length,
             needs: Recorded::Pose,
             unnamed: Some(Unnamed { family: Family::AllYield, contains: None, near: None }),
         }

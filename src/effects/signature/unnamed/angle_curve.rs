@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effects::Kind;
 use crate::effects::signature::library::{Hypothesis, Site};
-use crate::effects::signature::shape::{Displacement, Family, Follows, Form, Reading, Recorded, Unnamed, from_one};
+use crate::effects::signature::shape::{Displacement, Family, Follows, Form, Reading, Recorded, Size, Unnamed, from_one};
 
 use super::Nameless;
 
@@ -25,6 +25,7 @@ impl Follows for AngleCurve {
         Form {
             columns: 3,
             of_magnitude: 3,
+            size: Size::Length,
             needs: Recorded::Pose,
             unnamed: Some(Unnamed { family: Family::AngleCurve, contains: None, near: None }),
         }

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effects::signature::library::{Hypothesis, Site, twist_spread};
-use crate::effects::signature::shape::{Course, Displacement, Family, Follows, Form, Reading, Recorded, Unnamed};
+use crate::effects::signature::shape::{Course, Displacement, Family, Follows, Form, Reading, Recorded, Size, Unnamed};
 use crate::effects::{Kind, Level, Location};
 
 use super::Nameless;
@@ -33,6 +33,7 @@ impl Follows for BaseCourse {
         Form {
             columns: 6,
             of_magnitude: 3,
+            size: Size::Length,
             needs: Recorded::Pose,
             unnamed: Some(Unnamed { family: Family::BaseCourse, contains: None, near: None }),
         }
@@ -56,6 +57,7 @@ impl Follows for ToolCourse {
         Form {
             columns: if orientation { 6 } else { 3 },
             of_magnitude: 3,
+            size: Size::Length,
             needs: Recorded::Pose,
             unnamed: Some(Unnamed { family: Family::ToolCourse, contains: None, near: None }),
         }

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effects::signature::library::{Hypothesis, Site};
-use crate::effects::signature::shape::{Displacement, Family, Follows, Form, Reading, Recorded, Unnamed, from_one};
+use crate::effects::signature::shape::{Displacement, Family, Follows, Form, Reading, Recorded, Size, Unnamed, from_one};
 
 use super::Nameless;
 
@@ -27,6 +27,7 @@ impl Follows for DirectionLoad {
         Form {
             columns: 1,
             of_magnitude: 1,
+            size: Size::Length,
             needs: Recorded::Approach,
             unnamed: Some(Unnamed { family: Family::DirectionLoad, contains: None, near: None }),
         }

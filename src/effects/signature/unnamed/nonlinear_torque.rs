@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effects::Kind;
 use crate::effects::signature::library::{Hypothesis, Site};
-use crate::effects::signature::shape::{Displacement, Family, Follows, Form, Reading, Recorded, Unnamed, from_one};
+use crate::effects::signature::shape::{Displacement, Family, Follows, Form, Reading, Recorded, Size, Unnamed, from_one};
 
 use super::Nameless;
 
@@ -28,6 +28,7 @@ impl Follows for Softening {
         Form {
             columns: 2,
             of_magnitude: 2,
+            size: Size::Length,
             needs: Recorded::Pose,
             unnamed: Some(Unnamed { family: Family::NonlinearTorque, contains: Some(Kind::JointCompliance), near: None }),
         }
@@ -54,6 +55,7 @@ impl Follows for Hardening {
         Form {
             columns: 2,
             of_magnitude: 2,
+            size: Size::Length,
             needs: Recorded::Pose,
             unnamed: Some(Unnamed { family: Family::NonlinearTorque, contains: Some(Kind::JointCompliance), near: None }),
         }

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effects::signature::library::{Hypothesis, Site};
-use crate::effects::signature::shape::{Displacement, Family, Follows, Form, Reading, Recorded, Unnamed, from_one};
+use crate::effects::signature::shape::{Displacement, Family, Follows, Form, Reading, Recorded, Size, Unnamed, from_one};
 
 use super::Nameless;
 
@@ -27,6 +27,7 @@ impl Follows for TimeCurve {
         Form {
             columns: 2,
             of_magnitude: 2,
+            size: Size::Length,
             needs: Recorded::Pose,
             unnamed: Some(Unnamed { family: Family::TimeCurve, contains: None, near: None }),
         }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effects::Kind;
 use crate::effects::signature::library::{Hypothesis, Site};
-use crate::effects::signature::shape::{Displacement, Family, Follows, Form, Reading, Recorded, Unnamed, from_one, seated};
+use crate::effects::signature::shape::{Displacement, Family, Follows, Form, Reading, Recorded, Size, Unnamed, from_one, seated};
 
 use super::Nameless;
 
@@ -25,6 +25,7 @@ impl Follows for UnequalSeat {
         Form {
             columns: 2,
             of_magnitude: 2,
+            size: Size::Length,
             needs: Recorded::Pose,
             unnamed: Some(Unnamed { family: Family::UnequalSeat, contains: Some(Kind::TiltClearance), near: None }),
         }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::effects::Kind;
 use crate::effects::signature::library::{Hypothesis, Site};
 use crate::effects::signature::shape::{
-    Displacement, Family, Follows, Form, Reading, Recorded, Unnamed, from_one, seated, twist,
+    Displacement, Family, Follows, Form, Reading, Recorded, Size, Unnamed, from_one, seated, twist,
 };
 
 use super::Nameless;
@@ -28,6 +28,7 @@ impl Follows for UnequalShift {
         Form {
             columns: 2,
             of_magnitude: 2,
+            size: Size::Length,
             needs: Recorded::Pose,
             unnamed: Some(Unnamed { family: Family::UnequalShift, contains: Some(Kind::RadialClearance), near: None }),
         }
