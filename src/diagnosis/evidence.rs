@@ -328,6 +328,7 @@ pub(super) fn log_allowed(z: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::diagnosis::products::test_marginal;
+    use crate::diagnosis::settings::SCALES;
     use crate::effects::kind::joint_compliance::Torque;
     use crate::effects::signature::shape::Shape;
     use crate::effects::{Kind, Level, Location};

@@ -16,8 +16,7 @@ use super::products::{Marginal, Products};
 use super::ripple::{self, Ripple};
 use super::search::climb;
 use super::settings::{self, Settings};
-use crate::effects::kind::joint_eccentricity::Harmonic;
-use crate::effects::signature::shape::Shape;
+use crate::effects::signature::library::strongest;
 use crate::measurement::Measurement;
 
 /// What one fold says.
@@ -278,11 +277,8 @@ impl Validation<'_> {
             let of_rows = Linear { candidates: &candidates, ..linear.clone() };
             let again = ripple::scan(&of_rows, &residual, level, &counts, &self.settings.ripple);
             let is_again = |number: &usize| {
-                let shape = candidates.hypotheses[*number].shape;
-                let same = |one: &Ripple| {
-                    let (joint, order) = (one.joint, f64::from(one.waves));
-                    shape == Shape::Harmonic(Harmonic { joint, order })
-                };
+                let (joint, order) = strongest(&candidates.hypotheses[*number].shape).unwrap_or_default();
+                let same = |one: &Ripple| one.joint == joint && f64::from(one.waves) == order;
                 were_active[number - found.start] && again.iter().any(same)
             };
             let more: Vec<usize> = found.clone().filter(is_again).collect();

@@ -4,15 +4,19 @@
 //! same joint, and a named signature of that joint may fit it. So where there is a shape without a name, each name at its place has a rival
 //! that costs no prior odds, as it comes with the unknown cause: the same signature with the size that the difference may have
 //! (Kennedy and O'Hagan's discrepancy, embedded in the joint). A name stays where it does far more than such a difference. What the shape
-//! takes back of it is no part of that: two that are large against each other describe one cause together.
+//! takes back of it is no part of that: two that are large against each other describe one cause together. The same holds of a map that
+//! follows a joint's angle freely, and of ripples and harmonics beside it.
 
 use super::evidence::Evidence;
 use super::search::{Belief, Found};
 use crate::effects::signature::library::Hypothesis;
+use crate::effects::signature::shape::Size;
 
-/// Whether what `unknown` does not say of its cause may look like `named`: it sits in the same joint, or on the link that this one moves.
-fn is_beside(unknown: &Hypothesis, named: &Hypothesis) -> bool {
-    unknown.kind.is_none() && unknown.location.index.is_some() && unknown.location.index == named.location.index
+/// Whether what `rough` does not say of its cause may look like `named`: a shape without a name in the same joint, or on the link that
+/// this one moves; or a map of the joint's angle, which knows nothing finer than its values, beside another function of that angle.
+fn is_beside(rough: &Hypothesis, named: &Hypothesis) -> bool {
+    let finer = rough.shape.size() == Size::Rms && named.shape.size() != Size::Rms && named.shape.of_angle().is_some();
+    (rough.kind.is_none() || finer) && rough.location.index.is_some() && rough.location.index == named.location.index
 }
 
 /// `found` with the probability of each name shared with the unknown beside it.
@@ -36,7 +40,8 @@ pub(super) fn doubt(evidence: &Evidence<'_>, mut found: Found) -> Found {
         let as_cause = whole - evidence.log_posterior(&others);
         let share = 1.0 / (1.0 + libm::exp(as_misfit - as_cause));
         let claim = (named.kind, named.location);
-        let of_unknown = Belief { claim: (None, hypotheses[unknown].location), hypothesis: unknown, probability: 0.0 };
+        let rough = &hypotheses[unknown];
+        let of_unknown = Belief { claim: (rough.kind, rough.location), hypothesis: unknown, probability: 0.0 };
         let lists = std::iter::once(&mut found.claims).chain(found.causes.get_mut(number));
         for list in lists {
             let Some(at) = list.iter().position(|belief| belief.claim == claim) else {

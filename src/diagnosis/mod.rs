@@ -107,7 +107,7 @@ impl Options {
     fn candidates(&self, rows: &Rows, conditions: &Conditions, ripples: &[Ripple]) -> Candidates {
         let wanted = |hypothesis: &Hypothesis| self.wants(hypothesis.kind, hypothesis.location);
         let nameless = self.without.contains(&Kind::StrainWaveError);
-        let scanned = ripples.iter().map(|found| ripple(found.joint, found.waves, nameless));
+        let scanned = ripples.iter().flat_map(|found| ripple(found.joint, found.waves, nameless));
         let library = library(&rows.mechanism, &conditions.columns).into_iter();
         candidates(library.filter(wanted).collect(), scanned.filter(wanted).collect())
     }

@@ -55,6 +55,19 @@ impl Turning {
     }
 }
 
+/// Angles that differ by less are one, rad.
+const ONE_ANGLE: f64 = 1e-6;
+
+/// Periods per turn up to which a ripple shows in readings at these angles (rad): finer ones look like coarser ones where all angles lie
+/// on a grid, or do not differ at all.
+pub(super) fn finest(angles: impl Iterator<Item = f64>) -> u16 {
+    let mut angles: Vec<f64> = angles.collect();
+    angles.sort_by(f64::total_cmp);
+    let gaps = angles.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > ONE_ANGLE);
+    let limit = std::f64::consts::PI / gaps.fold(f64::INFINITY, f64::min);
+    limit.min(f64::from(*RIPPLES.end())) as u16
+}
+
 /// The strongest ripple of each joint in `residual` (m, rad), whose noise has the mean square `level` in declared sigmas; the strongest
 /// first, none that is weak or a candidate in play already. `counts`: rows that are looked at.
 pub(super) fn scan(
@@ -116,7 +129,7 @@ pub(super) fn scan(
                 }
                 (bb * right[0] * right[0] - 2.0 * ab * right[0] * right[1] + aa * right[1] * right[1]) / determinant / level
             };
-            RIPPLES
+            (*RIPPLES.start()..=finest(readings.iter().map(|reading| reading.joints[joint])))
                 .map(|waves| Ripple { joint, waves, drop: drop() })
                 .filter(|one| one.drop >= settings.worth)
                 .max_by(|a, b| a.drop.total_cmp(&b.drop).then(b.waves.cmp(&a.waves)))
@@ -133,6 +146,13 @@ mod tests {
     use super::*;
     use crate::diagnosis::tests::with_analysis;
     use crate::seed::stream;
+
+    #[test]
+    fn a_grid_of_angles_shows_half_as_many_periods_as_it_has_points_per_turn() {
+        let grid = |step: f64| finest((0..20).map(|at| f64::from(at * 7 % 20) * step.to_radians()));
+        assert_eq!([grid(10.0), grid(2.5), grid(0.01)], [18, 72, *RIPPLES.end()]);
+        assert_eq!(finest([0.3; 9].into_iter()), 0);
+    }
 
     #[test]
     fn a_multiple_that_is_turned_to_is_the_one_that_is_computed() {

@@ -13,8 +13,7 @@ use super::rows::Rows;
 use super::search::Found;
 use super::settings;
 use crate::effects::Kind;
-use crate::effects::kind::joint_eccentricity::Harmonic;
-use crate::effects::signature::library::{Hypothesis, RIPPLES};
+use crate::effects::signature::library::{Hypothesis, RIPPLES, strongest};
 use crate::effects::signature::shape::Shape;
 use crate::effects::signature::unnamed::Nameless;
 use crate::measurement::equations::Equations;
@@ -42,7 +41,7 @@ pub(super) fn alike(one: &[Scatter], other: &[Scatter], settings: &settings::Sca
 /// Whether scatter may be mistaken for it: one of thousands of ripples and bumps, or a function of the angle that is free to follow.
 pub(super) fn is_contested(of: &Hypothesis) -> bool {
     matches!(of.kind, Some(Kind::StrainWaveError | Kind::JointAngleMap))
-        || matches!(of.shape, Shape::Harmonic(Harmonic { order, .. }) if order >= f64::from(*RIPPLES.start()))
+        || strongest(&of.shape).is_some_and(|(_, order)| order >= f64::from(*RIPPLES.start()))
         || matches!(of.shape, Shape::Nameless(Nameless::Bump(_)))
 }
 

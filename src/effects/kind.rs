@@ -115,6 +115,7 @@ pub enum Shape {
     ToolStep(tool_step::ToolStep),
     Scale(measurement_scale::Scale),
     AngleTable(joint_angle_map::AngleTable),
+    Gear(strain_wave_error::Gear),
     /// One that no kind has.
     #[serde(untagged)]
     Nameless(Nameless),
@@ -152,6 +153,7 @@ impl Shape {
             Shape::ToolStep(of) => of,
             Shape::Scale(of) => of,
             Shape::AngleTable(of) => of,
+            Shape::Gear(of) => of,
             Shape::Nameless(of) => return Answers::Nameless(of),
         })
     }
@@ -994,8 +996,8 @@ mod tests {
         let schema = schemars::schema_for!(Shape);
         let shapes = schema.get("oneOf").and_then(Value::as_array).unwrap();
         let names: Vec<&str> = shapes.iter().filter_map(|shape| shape["properties"]["shape"]["const"].as_str()).collect();
-        assert_eq!((names.len(), shapes.len()), (36, 36), "{schema:?}");
-        assert_eq!((names[0], names[19], names[20], names[35]), ("torque", "angle_table", "unequal_bend", "time_curve"));
+        assert_eq!((names.len(), shapes.len()), (37, 37), "{schema:?}");
+        assert_eq!((names[0], names[20], names[21], names[36]), ("torque", "gear", "unequal_bend", "time_curve"));
         assert!(schema.get("anyOf").is_none());
     }
 

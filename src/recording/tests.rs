@@ -257,6 +257,9 @@ fn diagnosis(stream: &mut Stream, readings: usize) -> Diagnosis {
         detail: String::new(),
     };
     let all = Parameters {
+        angles_rad: Some(vec![0.0, 0.1]),
+        errors_rad: Some(vec![1e-4, -2e-4]),
+        sigmas_rad: Some(vec![1e-5, 2e-5]),
         sign: Some(-1.0),
         phase_rad: Some(stream.uniform(-1.0, 1.0)),
         order: Some(2.0),

@@ -32,6 +32,10 @@ impl Follows for Ratio {
     fn columns(&self, reading: &Reading, _: bool) -> Vec<Displacement> {
         vec![reading.moved(self.joint, reading.joints[self.source])]
     }
+
+    fn of_angle(&self) -> Option<usize> {
+        Some(self.source).filter(|source| *source == self.joint)
+    }
 }
 
 impl Named for Ratio {
@@ -55,7 +59,8 @@ pub(in crate::effects) fn hypotheses(site: &Site<'_>, all: &mut Vec<Hypothesis>)
         return;
     };
     let next = Some(joint + 1).filter(|next| *next < site.joints());
-    for source in [Some(joint), joint.checked_sub(1), next].into_iter().flatten() {
+    // Two joints behind one another drive a wrist: what turns the last goes through both.
+    for source in [Some(joint), joint.checked_sub(1), next, joint.checked_sub(2)].into_iter().flatten() {
         let detail = if source == joint { "its own angle".to_owned() } else { format!("angle of joint {}", source + 1) };
         all.push(Hypothesis { detail, ..site.hypothesis(Kind::GearCoupling, Shape::Ratio(Ratio { joint, source })) });
     }

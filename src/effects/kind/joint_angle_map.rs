@@ -56,6 +56,10 @@ impl Follows for AngleTable {
         }
         columns
     }
+
+    fn of_angle(&self) -> Option<usize> {
+        Some(self.joint)
+    }
 }
 
 impl Named for AngleTable {

@@ -40,6 +40,10 @@ impl Follows for Harmonic {
         let (sine, cosine) = libm::sincos(self.order * reading.joints[self.joint]);
         vec![reading.moved(self.joint, cosine), reading.moved(self.joint, sine)]
     }
+
+    fn of_angle(&self) -> Option<usize> {
+        Some(self.joint)
+    }
 }
 
 impl Named for Harmonic {
@@ -78,6 +82,10 @@ impl Follows for TwoHarmonics {
     fn columns(&self, reading: &Reading, orientation: bool) -> Vec<Displacement> {
         let of = |order: f64| Harmonic { joint: self.joint, order }.columns(reading, orientation);
         [1.0, 2.0].into_iter().flat_map(of).collect()
+    }
+
+    fn of_angle(&self) -> Option<usize> {
+        Some(self.joint)
     }
 }
 

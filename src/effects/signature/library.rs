@@ -4,7 +4,7 @@ use super::posture::Mechanism;
 use super::shape::Shape;
 use super::unnamed;
 pub use crate::effects::kind::radial_clearance::HELD;
-pub use crate::effects::kind::strain_wave_error::{RIPPLES, WAVES_PER_TURN, ripple};
+pub use crate::effects::kind::strain_wave_error::{RIPPLES, ripple, strongest};
 use crate::effects::{Kind, Level, Load, Location};
 
 /// Something that may be there.

@@ -20,6 +20,11 @@ pub(in crate::effects) trait Follows {
 
     /// Its columns at `reading`, which has what it follows.
     fn columns(&self, reading: &Reading, orientation: bool) -> Vec<Displacement>;
+
+    /// The joint (from 0) whose angle alone decides how much it is off, if there is one.
+    fn of_angle(&self) -> Option<usize> {
+        None
+    }
 }
 
 /// What those answer besides that a kind has: which have a name, or may have.
@@ -311,6 +316,12 @@ impl Shape {
     #[must_use]
     pub fn magnitude_width(&self) -> usize {
         self.follows().form(false).of_magnitude
+    }
+
+    /// The joint (from 0) whose angle alone decides how much it is off, if there is one.
+    #[must_use]
+    pub fn of_angle(&self) -> Option<usize> {
+        self.follows().of_angle()
     }
 
     /// How they do.

@@ -399,7 +399,8 @@ impl Effect {
                 Effect::JointEccentricity { joint, amplitude: magnitude, order, phase: stream.uniform(-PI, PI) }
             }
             Kind::StrainWaveError => {
-                let ratio = [80.0, 100.0, 120.0][stream.index(3)];
+                // Once, twice or four times per turn of a motor.
+                let ratio = [30.0, 50.0, 80.0, 100.0, 120.0, 160.0][stream.index(6)] * [0.5, 1.0, 2.0][stream.index(3)];
                 Effect::StrainWaveError { joint, amplitude: magnitude, ratio, phase: stream.uniform(-PI, PI) }
             }
             Kind::GearCoupling => {

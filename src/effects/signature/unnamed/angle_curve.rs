@@ -36,6 +36,10 @@ impl Follows for AngleCurve {
         let angle = reading.joints[joint];
         [angle, angle * angle, angle * angle * angle / 3.0].map(|amount| reading.moved(joint, amount)).to_vec()
     }
+
+    fn of_angle(&self) -> Option<usize> {
+        Some(self.joint)
+    }
 }
 
 pub(super) fn hypotheses(site: &Site<'_>, joint: usize, all: &mut Vec<Hypothesis>) {

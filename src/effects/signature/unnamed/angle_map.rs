@@ -42,6 +42,10 @@ impl Follows for AngleMap {
         let part = std::f64::consts::PI * (reading.joints[joint] - low) / (high - low).max(1e-9);
         (1..=MAP_ORDERS).map(|order| reading.moved(joint, libm::cos(order as f64 * part))).collect()
     }
+
+    fn of_angle(&self) -> Option<usize> {
+        Some(self.joint)
+    }
 }
 
 pub(super) fn hypotheses(site: &Site<'_>, joint: usize, all: &mut Vec<Hypothesis>) {

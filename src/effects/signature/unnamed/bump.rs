@@ -42,6 +42,10 @@ impl Follows for Bump {
         let height = if distance < 1.0 { 0.5 * (1.0 + libm::cos(std::f64::consts::PI * distance)) } else { 0.0 };
         vec![reading.moved(self.joint, height)]
     }
+
+    fn of_angle(&self) -> Option<usize> {
+        Some(self.joint)
+    }
 }
 
 pub(super) fn hypotheses(site: &Site<'_>, joint: usize, all: &mut Vec<Hypothesis>) {
