@@ -45,6 +45,9 @@ struct Fold {
     equations: f64,
 }
 
+/// Of so many entries of a signature at most one is not zero where only those are looked at.
+const SPARSE: usize = 6;
+
 /// Sum of products, in an order that does not depend on the processor.
 fn dot<A: Copy + Into<f64>, B: Copy + Into<f64>>(a: &[A], b: &[B]) -> f64 {
     let product = |a: A, b: B| -> f64 { a.into() * b.into() };
@@ -139,6 +142,12 @@ impl Products {
         self.columns.last().map_or(0, |last| last.end)
     }
 
+    /// All columns of the hypothesis that column `number` belongs to.
+    fn beside(&self, number: usize) -> Range<usize> {
+        let hypothesis = self.columns.partition_point(|columns| columns.end <= number);
+        self.columns[hypothesis].clone()
+    }
+
     /// Products of column `number` with every column: as many numbers per fold as there are columns.
     fn of_column(&self, number: usize) -> Arc<Vec<f64>> {
         if let Ok(known) = self.rows.read()
@@ -147,15 +156,18 @@ impl Products {
             return Arc::clone(row);
         }
         let width = self.width();
-        let mut row = vec![0.0; width * self.folds.len()];
-        for (fold, sums) in self.folds.iter().zip(row.chunks_exact_mut(width.max(1))) {
-            fold.add_products(number, sums);
+        let block = self.beside(number);
+        let mut rows = vec![vec![0.0; width * self.folds.len()]; block.len()];
+        for (number, fold) in self.folds.iter().enumerate() {
+            let parts = rows.iter_mut().map(|row| &mut row[number * width..(number + 1) * width]).collect();
+            fold.add_products(block.clone(), parts);
         }
-        let row = Arc::new(row);
+        let rows: Vec<Arc<Vec<f64>>> = rows.into_iter().map(Arc::new).collect();
+        let asked = Arc::clone(&rows[number - block.start]);
         if let Ok(mut known) = self.rows.write() {
-            known.insert(number, Arc::clone(&row));
+            known.extend(block.zip(rows));
         }
-        row
+        asked
     }
 }
 
@@ -165,10 +177,32 @@ impl Fold {
         &self.signatures[number * self.height..(number + 1) * self.height]
     }
 
-    /// Products of column `number` with every column, added to `sums`.
-    fn add_products(&self, number: usize, sums: &mut [f64]) {
-        let own: Vec<f64> = self.signature(number).iter().map(|value| f64::from(*value)).collect();
-        add_dots(&own, &self.signatures, sums);
+    /// Products of each of the columns `block` with every column, added to its `sums`.
+    fn add_products(&self, block: Range<usize>, mut sums: Vec<&mut [f64]>) {
+        // The values of a map are nothing but near their angles: then one look at every other column serves all of them.
+        let entries: Vec<(usize, usize, f64)> = block
+            .clone()
+            .enumerate()
+            .flat_map(|(at, number)| self.signature(number).iter().enumerate().map(move |(row, value)| (row, at, f64::from(*value))))
+            .filter(|(.., value)| *value != 0.0)
+            .collect();
+        if block.len() == 1 || SPARSE * entries.len() > block.len() * self.height {
+            for (number, sums) in block.zip(sums) {
+                let own: Vec<f64> = self.signature(number).iter().map(|value| f64::from(*value)).collect();
+                add_dots(&own, &self.signatures, sums);
+            }
+            return;
+        }
+        let mut entries = entries;
+        entries.sort_by_key(|(row, at, _)| (*row, *at));
+        let mut of_block = vec![0.0; block.len()];
+        for (other, column) in self.signatures.chunks_exact(self.height.max(1)).enumerate() {
+            of_block.fill(0.0);
+            for (row, at, value) in &entries {
+                of_block[*at] += value * f64::from(column[*row]);
+            }
+            sums.iter_mut().zip(&of_block).for_each(|(sums, value)| sums[other] += value);
+        }
     }
 
     fn new(
@@ -358,29 +392,35 @@ impl<'a> Marginal<'a> {
             return Arc::clone(row);
         }
         let width = self.products.width();
-        let mut row = vec![0.0; width];
+        let block = self.products.beside(number);
+        let mut rows = vec![vec![0.0; width]; block.len()];
         if self.left_out.is_some() {
-            let by_fold = self.products.of_column(number);
-            for (fold, values) in by_fold.chunks_exact(width.max(1)).enumerate() {
-                if Some(fold) != self.left_out {
-                    row.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+            for (row, number) in rows.iter_mut().zip(block.clone()) {
+                let by_fold = self.products.of_column(number);
+                for (fold, values) in by_fold.chunks_exact(width.max(1)).enumerate() {
+                    if Some(fold) != self.left_out {
+                        row.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+                    }
                 }
             }
         } else {
             // Of many columns, which no fold asks for.
             for fold in &self.products.folds {
-                fold.add_products(number, &mut row);
+                fold.add_products(block.clone(), rows.iter_mut().map(Vec::as_mut_slice).collect());
             }
         }
-        let mixed = column(&self.mixed, number);
-        for (other, value) in row.iter_mut().enumerate() {
-            *value -= dot(mixed, column(&self.absorbed, other));
+        for (row, number) in rows.iter_mut().zip(block.clone()) {
+            let mixed = column(&self.mixed, number);
+            for (other, value) in row.iter_mut().enumerate() {
+                *value -= dot(mixed, column(&self.absorbed, other));
+            }
         }
-        let row = Arc::new(row);
+        let rows: Vec<Arc<Vec<f64>>> = rows.into_iter().map(Arc::new).collect();
+        let asked = Arc::clone(&rows[number - block.start]);
         if let Ok(mut known) = self.rows.write() {
-            known.insert(number, Arc::clone(&row));
+            known.extend(block.zip(rows));
         }
-        row
+        asked
     }
 
     /// What survives of columns `i` and `j` of `hypothesis`, counted from its first.

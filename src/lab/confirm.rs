@@ -575,7 +575,7 @@ mod tests {
             seen.insert(kind);
             let size = (hypothesis.range[0] * hypothesis.range[1]).sqrt();
             let coefficients: Vec<f64> = (0..hypothesis.shape.width(orientation))
-                .map(|at| if kind == Kind::Backlash { -size } else { size * [1.0, -0.6, 0.3, 0.5, 0.8, -0.7][at] })
+                .map(|at| if kind == Kind::Backlash { -size } else { size * [1.0, -0.6, 0.3, 0.5, 0.8, -0.7][at % 6] })
                 .collect();
             let effect = named(hypothesis, &coefficients, ROWS);
             // Through JSON, as it is recorded.

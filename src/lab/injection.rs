@@ -130,7 +130,7 @@ mod tests {
                 let effect = Effect::drawn(kind, place, low, &arm, &mut stream(3, kind.name()));
                 assert_eq!(effect.location(), location(kind, place));
                 assert_eq!((effect.kinds(), effect.name()), (vec![kind], kind.name()));
-                assert!((effect.magnitude(Some(kind)) / low - 1.0).abs() < 1e-12, "{effect:?}");
+                assert!((effect.magnitude(Some(kind)) / low - 1.0).abs() < 1e-12, "{} at {place:?}", kind.name());
             }
         }
     }

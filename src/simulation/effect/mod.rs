@@ -618,8 +618,10 @@ fn graduation(rms: f64, stream: &mut Stream) -> (Vec<f64>, Vec<f64>) {
     let error = |angle: &f64| -> f64 {
         waves.iter().map(|(order, a, b)| scale * (a * libm::cos(order * angle) + b * libm::sin(order * angle))).sum()
     };
-    let errors = angles.iter().map(error).collect();
-    (angles, errors)
+    let errors: Vec<f64> = angles.iter().map(error).collect();
+    // The end of a turn counts twice.
+    let exact = rms / statistics::rms(errors.iter().copied());
+    (angles, errors.iter().map(|error| exact * error).collect())
 }
 
 /// Whose motion leaks into `joint` of an arm of so many `joints`: `None` for its own gear in half of the cases, else a neighbour, whose
