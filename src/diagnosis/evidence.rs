@@ -3,7 +3,7 @@
 
 use std::f64::consts::LN_2;
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::fitted::Fitted;
 use super::products::Marginal;
@@ -101,7 +101,7 @@ pub(crate) fn one_signed(hypothesis: &Hypothesis) -> bool {
 /// Members fitted together.
 struct Solved {
     columns: Vec<usize>,
-    inverse: DMatrix<f64>,
+    factor: Cholesky<f64, Dyn>,
     coefficients: DVector<f64>,
     drop: f64,
     log_determinant: f64,
@@ -174,7 +174,7 @@ impl<'a> Evidence<'a> {
         let drop = right.dot(&coefficients);
         let factor = cholesky.l_dirty();
         let log_determinant = (0..count).map(|i| 2.0 * libm::log(factor[(i, i)]) - libm::log(precision[i])).sum::<f64>();
-        Some(Solved { columns, inverse: cholesky.inverse(), coefficients, drop, log_determinant })
+        Some(Solved { columns, factor: cholesky, coefficients, drop, log_determinant })
     }
 
     /// Logarithm of the evidence over that of no effect.
@@ -206,7 +206,10 @@ impl<'a> Evidence<'a> {
         for (hypothesis, scale) in members {
             total += self.candidates.log_odds[*hypothesis] + libm::log(self.settings.prior.scale_shares[*scale]);
             if one_signed(&self.candidates.hypotheses[*hypothesis]) {
-                total += log_allowed(model.coefficients[at] / libm::sqrt(level * model.inverse[(at, at)]).max(1e-300));
+                let mut unit = DVector::zeros(model.columns.len());
+                unit[at] = 1.0;
+                let variance = model.factor.solve(&unit)[at];
+                total += log_allowed(model.coefficients[at] / libm::sqrt(level * variance).max(1e-300));
             }
             at += self.candidates.columns(*hypothesis).len();
         }
@@ -293,21 +296,21 @@ impl<'a> Evidence<'a> {
             noise: self.level(model.drop),
             columns: model.columns,
             coefficients: model.coefficients,
-            covariance: model.inverse,
+            covariance: model.factor.inverse(),
         })
     }
 
     /// Columns and coefficients of `members`.
     #[must_use]
     pub(crate) fn coefficients(&self, members: &[(usize, usize)]) -> Vec<(usize, f64)> {
-        let fit = self.fit(members);
-        fit.map_or_else(Vec::new, |fit| fit.columns.into_iter().zip(fit.coefficients.iter().copied()).collect())
+        let solved = self.solve(members);
+        solved.map_or_else(Vec::new, |model| model.columns.into_iter().zip(model.coefficients.iter().copied()).collect())
     }
 
     /// All sets that have one effect more than `members`.
     #[must_use]
     pub(crate) fn extensions(&self, members: &[(usize, usize)]) -> Vec<Extension> {
-        Fitted::new(self, members).extensions(None)
+        Fitted::new(self, members).extensions()
     }
 }
 

@@ -272,12 +272,6 @@ impl<'a> Fitted<'a> {
         self.log_posterior_of(&self.beside(&[]))
     }
 
-    /// The same without number `at` of them.
-    #[must_use]
-    pub(super) fn log_posterior_without(&self, at: usize) -> f64 {
-        self.log_posterior_of(&self.beside(&[at]))
-    }
-
     fn log_posterior_of(&self, beside: &Beside) -> f64 {
         if beside.count == 0 {
             return 0.0;
@@ -287,10 +281,20 @@ impl<'a> Fitted<'a> {
         log_multiplicity(beside.count) + beside.prior + self.evidence.log_ratio(beside.drop, beside.log_determinant) + signs
     }
 
-    /// All sets that have one effect more than the members, or than these without number `without` of them.
+    /// All sets that have one effect more than the members.
     #[must_use]
-    pub(super) fn extensions(&self, without: Option<usize>) -> Vec<Extension> {
-        let beside = self.beside(without.as_slice());
+    pub(super) fn extensions(&self) -> Vec<Extension> {
+        self.extensions_of(&self.beside(&[]), None)
+    }
+
+    /// The log posterior without number `at` of the members, and all sets with another effect in its place.
+    #[must_use]
+    pub(super) fn exchanges(&self, at: usize) -> (f64, Vec<Extension>) {
+        let beside = self.beside(&[at]);
+        (self.log_posterior_of(&beside), self.extensions_of(&beside, Some(at)))
+    }
+
+    fn extensions_of(&self, beside: &Beside, without: Option<usize>) -> Vec<Extension> {
         let candidates = self.evidence.candidates;
         let mut found = Vec::with_capacity(SCALES * candidates.hypotheses.len());
         for hypothesis in 0..candidates.hypotheses.len() {
@@ -302,7 +306,7 @@ impl<'a> Fitted<'a> {
                 }
                 let first = found.len() - SCALES;
                 let put = |scale: usize, log_posterior: f64| found[first + scale].log_posterior = log_posterior;
-                self.extension(&beside, hypothesis, 0..SCALES, put);
+                self.extension(beside, hypothesis, 0..SCALES, put);
             }
         }
         found
@@ -335,26 +339,21 @@ impl<'a> Fitted<'a> {
                 taken
             })
             .collect();
-        let total =
-            |scale: usize, drop: f64, log_determinant: f64, coefficients: &[f64], covariance: &dyn Fn(usize, usize) -> f64| {
-                let level = evidence.level(drop);
-                let mut total = prior + libm::log(evidence.settings.prior.scale_shares[scale]);
-                total += evidence.log_ratio(drop, beside.log_determinant + log_determinant);
-                if signed {
-                    total += log_of_sign(coefficients[0], level, covariance(0, 0));
-                }
-                for ((_, value, variance), taken) in beside.signed.iter().zip(&of_signed) {
-                    let shift: f64 = taken.iter().zip(coefficients).map(|(taken, value)| taken * value).sum();
-                    let mut more = 0.0;
-                    for i in 0..width {
-                        for j in 0..width {
-                            more += taken[i] * covariance(i, j) * taken[j];
-                        }
-                    }
-                    total += log_of_sign(value - shift, level, variance + more);
-                }
-                total
-            };
+        let one: Vec<f64> = (0..width).map(|i| f64::from(u8::from(i == 0))).collect();
+        // `variance`: of a sum of the new coefficients with such factors.
+        let total = |scale: usize, drop: f64, log_determinant: f64, coefficients: &[f64], variance: &dyn Fn(&[f64]) -> f64| {
+            let level = evidence.level(drop);
+            let mut total = prior + libm::log(evidence.settings.prior.scale_shares[scale]);
+            total += evidence.log_ratio(drop, beside.log_determinant + log_determinant);
+            if signed {
+                total += log_of_sign(coefficients[0], level, variance(&one));
+            }
+            for ((_, value, own), taken) in beside.signed.iter().zip(&of_signed) {
+                let shift: f64 = taken.iter().zip(coefficients).map(|(taken, value)| taken * value).sum();
+                total += log_of_sign(value - shift, level, own + variance(taken));
+            }
+            total
+        };
         let precision = |scale: usize| {
             let size = self.size((hypothesis, scale));
             1.0 / (size * size)
@@ -371,7 +370,7 @@ impl<'a> Fitted<'a> {
                 let diagonal = left + precision(scale);
                 let coefficient = right / diagonal;
                 let more = libm::log(diagonal / precision(scale));
-                put(scale, total(scale, beside.drop + right * coefficient, more, &[coefficient], &|_, _| 1.0 / diagonal));
+                put(scale, total(scale, beside.drop + right * coefficient, more, &[coefficient], &|of| of[0] * of[0] / diagonal));
             }
             return;
         }
@@ -391,9 +390,14 @@ impl<'a> Fitted<'a> {
             };
             let coefficients = cholesky.solve(&right);
             let more = log_determinant(&cholesky) - width as f64 * libm::log(precision(scale));
-            let inverse = if signed || !beside.signed.is_empty() { cholesky.inverse() } else { DMatrix::zeros(width, width) };
+            let factor = cholesky.l_dirty();
+            let variance = |of: &[f64]| {
+                let mut of = DVector::from_column_slice(of);
+                factor.solve_lower_triangular_mut(&mut of);
+                of.norm_squared()
+            };
             let drop = beside.drop + right.dot(&coefficients);
-            put(scale, total(scale, drop, more, coefficients.as_slice(), &|i, j| inverse[(i, j)]));
+            put(scale, total(scale, drop, more, coefficients.as_slice(), &variance));
         }
     }
 
@@ -485,12 +489,13 @@ mod tests {
             for at in 0..members.len() {
                 let mut fewer = members.clone();
                 fewer.remove(at);
-                near(fitted.log_posterior_without(at), evidence.log_posterior(&fewer));
-                for extension in fitted.extensions(Some(at)) {
+                let (without, others) = fitted.exchanges(at);
+                near(without, evidence.log_posterior(&fewer));
+                for extension in others {
                     near(extension.log_posterior, evidence.log_posterior(&[&fewer[..], &[extension.member]].concat()));
                 }
             }
-            let extensions = fitted.extensions(None);
+            let extensions = fitted.extensions();
             for extension in &extensions {
                 near(extension.log_posterior, evidence.log_posterior(&[&members[..], &[extension.member]].concat()));
                 near(extension.log_posterior, fitted.log_posterior_with(extension.member));

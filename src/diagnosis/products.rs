@@ -183,7 +183,9 @@ impl Fold {
         let entries: Vec<(usize, usize, f64)> = block
             .clone()
             .enumerate()
-            .flat_map(|(at, number)| self.signature(number).iter().enumerate().map(move |(row, value)| (row, at, f64::from(*value))))
+            .flat_map(|(at, number)| {
+                self.signature(number).iter().enumerate().map(move |(row, value)| (row, at, f64::from(*value)))
+            })
             .filter(|(.., value)| *value != 0.0)
             .collect();
         if block.len() == 1 || SPARSE * entries.len() > block.len() * self.height {

@@ -62,7 +62,7 @@ pub(crate) fn climb(evidence: &Evidence<'_>, start: &[(usize, usize)], most: usi
     let mut value = fitted.log_posterior();
     loop {
         while fitted.members().len() < most {
-            match best_of(fitted.extensions(None)) {
+            match best_of(fitted.extensions()) {
                 Some((member, better)) if better > value + BETTER => {
                     fitted.add(member);
                     value = better;
@@ -72,8 +72,9 @@ pub(crate) fn climb(evidence: &Evidence<'_>, start: &[(usize, usize)], most: usi
         }
         let exchanges = (0..fitted.members().len()).filter_map(|at| {
             let own = fitted.members()[at];
-            let without = (fitted.log_posterior_without(at), at, None);
-            let with = best_of(fitted.extensions(Some(at))).filter(|(member, _)| *member != own);
+            let (without, others) = fitted.exchanges(at);
+            let without = (without, at, None);
+            let with = best_of(others).filter(|(member, _)| *member != own);
             let with = with.map(|(member, better)| (better, at, Some(member)));
             with.into_iter().chain([without]).max_by(|a, b| a.0.total_cmp(&b.0))
         });
@@ -128,7 +129,7 @@ fn walk(evidence: &Evidence<'_>, best: &[(usize, usize)], most: usize) -> Found 
                 fitted.members().iter().position(|known| *known == member).into_iter().for_each(|at| fitted.remove(at));
             }
             let nothing = fitted.log_posterior();
-            let extensions = fitted.extensions(None);
+            let extensions = fitted.extensions();
             let top = extensions.iter().map(|extension| extension.log_posterior).fold(nothing, f64::max);
             let weight = |extension: &Extension| libm::exp(extension.log_posterior - top);
             let nothing = libm::exp(nothing - top);
