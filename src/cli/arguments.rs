@@ -172,6 +172,9 @@ pub(crate) struct NewOptions {
     /// Magnitudes up to those of hobby and cable-driven arms: joints that yield by degrees, play of two degrees
     #[arg(long)]
     pub(crate) soft: bool,
+    /// The arm comes to each configuration straight from the one before, which effects of the last move need to be told
+    #[arg(long)]
+    pub(crate) direct: bool,
     /// Share of cases without an effect; without it every number of effects is as likely
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     pub(crate) base_rate: Option<f64>,

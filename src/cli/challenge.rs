@@ -11,7 +11,7 @@ use super::Outcome;
 use super::arguments::{Baseline, ChallengeCommand, Global, NewOptions, SceneOptions, ScoreOptions};
 use super::bar::Bar;
 use super::output;
-use crate::effects::{Kind, Location};
+use crate::effects::{Kind, Location, Need};
 use crate::lab::challenge::folder::{self, COMMITMENT, MANIFEST, SEAL};
 use crate::lab::challenge::score::{self, closes, restorable};
 use crate::lab::challenge::verdict::{Diagnose, Gap, Verdict, nothing};
@@ -94,7 +94,15 @@ fn new(global: &Global, options: &NewOptions) -> anyhow::Result<Outcome> {
         withheld: withheld(&options.withheld)?,
         outside: options.outside,
         soft: options.soft,
+        direct: options.direct,
     };
+    let of_moves = |name: &&String| Kind::from_name(name).is_some_and(|kind| kind.descriptor().needs.contains(&Need::Moves));
+    let unseen: Vec<&str> = options.kinds.iter().filter(of_moves).map(String::as_str).collect();
+    ensure!(
+        options.direct || unseen.is_empty(),
+        "--kinds {}: nothing tells these from play where the arm comes over a point beside each configuration; add --direct",
+        unseen.join(",")
+    );
     ensure!((1..=9999).contains(&cases.cases), "--cases {}: 1 to 9999", cases.cases);
     ensure!(cases.outside <= MOST_OUTSIDE, "--outside {}: {MOST_OUTSIDE} at most", cases.outside);
     ensure!(

@@ -82,6 +82,8 @@ pub enum Reason {
     TooSmall,
     /// Nobody recorded from which side joints came.
     NoApproach,
+    /// The arm came to its readings over points between, or nobody knows from where.
+    NoMoves,
     /// The joint always came from one side.
     OneSide,
     /// No temperatures that change were recorded.

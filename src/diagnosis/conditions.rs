@@ -8,7 +8,7 @@ use super::deflection::{Deflected, Loads, Present, deflected};
 use super::rows::Rows;
 use super::settings::Model;
 use crate::effects::signature::library::Columns;
-use crate::effects::signature::shape::{Displacement, FORGETTING_S, MEMORIES, Reading};
+use crate::effects::signature::shape::{Displacement, FADING_S, FORGETTING_S, MEMORIES, Reading};
 use crate::measurement::Measurement;
 
 /// Rows as signatures see them, and what the data have.
@@ -53,6 +53,7 @@ pub(crate) fn conditions(
     if !approach {
         notes.push(Note::NoApproach);
     }
+    let moves = if approach { straight_moves(measurements, &in_time) } else { None };
     let links = measurements.iter().all(|row| row.temperatures_c.len() >= count);
     let ambient = measurements.iter().all(|row| row.ambient_c.is_some());
     let mut temperature = links || ambient;
@@ -112,8 +113,12 @@ pub(crate) fn conditions(
             order: order[row],
             torque_memory: vec![[0.0; FORGETTING_S.len()]; count],
             gravity: measurement.gravity(&rows.mechanism.gravity),
+            behind: if moves.is_some() { vec![[0.0; FADING_S.len()]; count] } else { Vec::new() },
             memory: vec![[0.0; MEMORIES.len()]; count],
         });
+    }
+    if let Some(moves) = &moves {
+        fall_behind(measurements, &in_time, moves, &mut readings);
     }
     // What remembers the loads of earlier readings, remembers those without effects.
     remember(measurements, &in_time, &mut readings);
@@ -142,6 +147,7 @@ pub(crate) fn conditions(
     let changes = (margin..total.saturating_sub(margin)).step_by(stride).collect();
     let columns = Columns {
         approach,
+        moves: moves.is_some(),
         temperature,
         orientation: rows.equations.has_orientation(),
         time,
@@ -151,6 +157,47 @@ pub(crate) fn conditions(
         changes: if time { changes } else { Vec::new() },
     };
     (Conditions { readings, columns, notes, in_time }, displacement)
+}
+
+/// Movement of a joint from reading to reading below which it stood, rad or m.
+const STOOD: f64 = 2e-4;
+
+/// Of each row, the way of each joint from the reading before, rad or m: none at the first of a session. `None` where the sides of approach
+/// tell of other moves: over a point between.
+fn straight_moves(measurements: &[&Measurement], in_time: &[usize]) -> Option<Vec<Vec<f64>>> {
+    let mut moves = vec![vec![0.0; measurements[*in_time.first()?].joints.len()]; measurements.len()];
+    for pair in in_time.windows(2) {
+        let [before, row] = [pair[0], pair[1]].map(|row| measurements[row]);
+        if before.session != row.session {
+            continue;
+        }
+        for (joint, way) in moves[pair[1]].iter_mut().enumerate() {
+            *way = row.joints[joint] - before.joints[joint];
+            if way.abs() > STOOD && f64::from(row.approach[joint]) * *way < 0.0 {
+                return None;
+            }
+        }
+    }
+    Some(moves)
+}
+
+/// What is left of each joint's moves at each reading.
+fn fall_behind(measurements: &[&Measurement], in_time: &[usize], moves: &[Vec<f64>], readings: &mut [Reading]) {
+    let mut behind = readings.first().map_or_else(Vec::new, |reading| reading.behind.clone());
+    let mut before: Option<&Measurement> = None;
+    for row in in_time {
+        let now = measurements[*row];
+        let pause = before.map_or(0.0, |before| (now.time_s - before.time_s).max(0.0));
+        let begins = before.is_none_or(|before| before.session != now.session);
+        for (behind, way) in behind.iter_mut().zip(&moves[*row]) {
+            for (behind, fading) in behind.iter_mut().zip(FADING_S) {
+                let kept = if begins || fading == 0.0 { 0.0 } else { libm::exp(-pause / fading) };
+                *behind = *behind * kept + way;
+            }
+        }
+        readings[*row].behind.clone_from(&behind);
+        before = Some(now);
+    }
 }
 
 /// What came before, in time: loads and moves that a joint may remember.

@@ -9,7 +9,7 @@ use super::power::Bench;
 use super::products::Marginal;
 use super::search::Claim;
 use crate::effects::signature::library::Hypothesis;
-use crate::effects::{Kind, Load, Location, Need};
+use crate::effects::{Kind, Level, Load, Location, Need};
 
 /// What would show and what would not.
 pub(super) struct Detectability {
@@ -70,14 +70,15 @@ pub(super) fn detectability(analysis: &Analysis<'_>, noise: f64) -> Detectabilit
     let columns = &analysis.conditions.columns;
     let joints = analysis.linear.rows.mechanism.joint_count();
     let mut missing = |kind: Kind, reason: Reason| {
-        for joint in 1..=joints {
-            if !analysis.options.wants(Some(kind), Location { level: kind.level(), index: Some(joint) }) {
+        let numbered = matches!(kind.level(), Level::Joint | Level::Link);
+        for index in (1..=joints).map(Some).filter(|_| numbered).chain((!numbered).then_some(None)) {
+            if !analysis.options.wants(Some(kind), Location { level: kind.level(), index }) {
                 continue;
             }
             all += 1.0;
             undetectable.push(Hidden {
                 kind,
-                location: Place::of(kind.level(), Some(joint)),
+                location: Place::of(kind.level(), index),
                 minimum_detectable: MinimumDetectable { value: None, unit: kind.unit().to_owned() },
                 reason,
             });
@@ -87,6 +88,9 @@ pub(super) fn detectability(analysis: &Analysis<'_>, noise: f64) -> Detectabilit
         let needs = kind.descriptor().needs;
         if needs.contains(&Need::ApproachSides) && !columns.approach {
             missing(kind, Reason::NoApproach);
+        }
+        if needs.contains(&Need::Moves) && !columns.moves {
+            missing(kind, Reason::NoMoves);
         }
         if needs.contains(&Need::Temperatures) && !columns.temperature {
             missing(kind, Reason::NoTemperatures);

@@ -174,6 +174,8 @@ pub enum Load {
 pub enum Need {
     /// From which side each joint was approached, and both sides.
     ApproachSides,
+    /// Moves that lead straight from reading to reading, in an order that is known.
+    Moves,
     /// Temperatures that change.
     Temperatures,
     /// The time of each reading.
@@ -190,6 +192,7 @@ impl Need {
     pub fn words(self) -> &'static str {
         match self {
             Need::ApproachSides => "sides of approach",
+            Need::Moves => "moves straight from reading to reading",
             Need::Temperatures => "temperatures",
             Need::Times => "times",
             Need::Masses => "masses of the links",

@@ -5,6 +5,8 @@ pub mod backlash;
 pub mod base_drift;
 pub mod base_step;
 pub mod base_tilt;
+pub mod creep;
+pub mod direction_of_move;
 pub mod gear_coupling;
 pub mod gravity_lost_motion;
 pub mod joint_angle_map;
@@ -18,6 +20,7 @@ pub mod radial_clearance;
 pub mod strain_wave_error;
 pub mod tilt_clearance;
 pub mod tool_step;
+pub mod unsettled_reading;
 
 use std::fmt;
 
@@ -72,6 +75,12 @@ pub enum Kind {
     MeasurementScale,
     /// A fixed error of the joint angle that follows it in no simple way: encoder or transmission. Root mean square over the readings.
     JointAngleMap,
+    /// A joint goes on moving after each move: behind by a share of the way that fades with time.
+    Creep,
+    /// A joint lags behind its last move by an angle that grows with its torque; from side to side.
+    DirectionOfMove,
+    /// All joints were read before the arm had settled: behind by one share of the last move.
+    UnsettledReading,
     /// Some readings are far off.
     MeasurementOutliers,
     /// Not known to the diagnosis: a sector of worn teeth, in which the output falls behind.
@@ -116,6 +125,9 @@ pub enum Shape {
     Scale(measurement_scale::Scale),
     AngleTable(joint_angle_map::AngleTable),
     Gear(strain_wave_error::Gear),
+    Behind(creep::Behind),
+    DirectionLoad(direction_of_move::DirectionLoad),
+    Unsettled(unsettled_reading::Unsettled),
     /// One that no kind has.
     #[serde(untagged)]
     Nameless(Nameless),
@@ -154,6 +166,9 @@ impl Shape {
             Shape::Scale(of) => of,
             Shape::AngleTable(of) => of,
             Shape::Gear(of) => of,
+            Shape::Behind(of) => of,
+            Shape::DirectionLoad(of) => of,
+            Shape::Unsettled(of) => of,
             Shape::Nameless(of) => return Answers::Nameless(of),
         })
     }
@@ -196,6 +211,8 @@ const OTHER_DISTANCES: &str = "targets at several distances from the joint";
 const OTHER_ORIENTATIONS: &str = "the same few configurations again with another orientation of the tool";
 const ON_THE_FOOT: &str = "a target on the base, or on the first link near it";
 const WHOLE_TRAVEL: &str = "the whole travel of the joint";
+const LONG_AND_SHORT: &str = "long and short moves to the reading: play does not grow with them";
+const ONE_BY_ONE: &str = "moves of one joint at a time";
 const DENSE_ANGLES: &str = "readings at many angles of the joint, a degree or less apart";
 const SPREAD_OVER_TIME: &str = "readings spread evenly over the session";
 const ENCODERS_FEEL_NO_LOAD: &str = "several payloads: an encoder does not feel them";
@@ -232,7 +249,7 @@ const GROWN: Misses = Misses { fitted: 0.05, as_said: 0.02 };
 
 impl Kind {
     /// Every kind, those that the diagnosis knows first.
-    pub const ALL: [Kind; 24] = [
+    pub const ALL: [Kind; 27] = [
         Kind::JointCompliance,
         Kind::LinkBending,
         Kind::Backlash,
@@ -250,6 +267,9 @@ impl Kind {
         Kind::ToolStep,
         Kind::MeasurementScale,
         Kind::JointAngleMap,
+        Kind::Creep,
+        Kind::DirectionOfMove,
+        Kind::UnsettledReading,
         Kind::MeasurementOutliers,
         Kind::WornToothSector,
         Kind::CreepAfterMotion,
@@ -334,7 +354,11 @@ impl Kind {
                 needs: &[Need::ApproachSides],
                 known: Some(Known { hypotheses: backlash::hypotheses, misses: FIRST_ORDER, doubles: None, advice: &[] }),
                 may_repeat: false,
-                neighbours: &[Neighbour { kind: Kind::GravityLostMotion, told_apart_by: BOTH_SIDES }],
+                neighbours: &[
+                    Neighbour { kind: Kind::GravityLostMotion, told_apart_by: BOTH_SIDES },
+                    Neighbour { kind: Kind::Creep, told_apart_by: LONG_AND_SHORT },
+                    Neighbour { kind: Kind::DirectionOfMove, told_apart_by: PAYLOADS },
+                ],
                 scene: SceneKeys { place: ScenePlace::TurningJoint, required: &["width_arcsec"], optional: &[] },
             },
             Kind::GravityLostMotion => &Descriptor {
@@ -715,6 +739,66 @@ impl Kind {
                 ],
                 scene: SceneKeys { place: ScenePlace::TurningJoint, required: &["angles_deg", "errors_arcsec"], optional: &[] },
             },
+            Kind::Creep => &Descriptor {
+                name: "creep",
+                about: "the joint goes on moving after each move",
+                level: Level::Joint,
+                unit: Unit::Ratio,
+                magnitude: "share of the move left at the reading",
+                range: Range::Everywhere([0.5e-4, 10e-4]),
+                source: Source::Assumed,
+                softest: TENFOLD,
+                most: UNLIMITED,
+                one_signed: false,
+                sign_apart: false,
+                load: Load::None,
+                needs: &[Need::Moves],
+                known: Some(Known { hypotheses: creep::hypotheses, misses: FIRST_ORDER, doubles: None, advice: &[] }),
+                may_repeat: false,
+                neighbours: &[
+                    Neighbour { kind: Kind::Backlash, told_apart_by: LONG_AND_SHORT },
+                    Neighbour { kind: Kind::UnsettledReading, told_apart_by: ONE_BY_ONE },
+                ],
+                scene: SceneKeys { place: ScenePlace::Joint, required: &["lag_ppm", "time_constant_s"], optional: &[] },
+            },
+            Kind::DirectionOfMove => &Descriptor {
+                name: "direction_of_move",
+                about: "friction that grows with the torque winds the joint up",
+                level: Level::Joint,
+                unit: Unit::RadianPerNewtonMetre,
+                magnitude: "angle per torque, from side to side",
+                range: Range::Everywhere([0.5e-5, 5e-5]),
+                source: Source::Assumed,
+                softest: TENFOLD,
+                most: UNLIMITED,
+                one_signed: false,
+                sign_apart: true,
+                load: Load::Drives,
+                needs: &[Need::ApproachSides, Need::Masses],
+                known: Some(Known { hypotheses: direction_of_move::hypotheses, misses: DEFLECTED, doubles: None, advice: &[] }),
+                may_repeat: false,
+                neighbours: &[Neighbour { kind: Kind::Backlash, told_apart_by: PAYLOADS }],
+                scene: SceneKeys { place: ScenePlace::TurningJoint, required: &["gain_urad_per_nm"], optional: &[] },
+            },
+            Kind::UnsettledReading => &Descriptor {
+                name: "unsettled_reading",
+                about: "read before the arm has settled: all joints lag",
+                level: Level::Sensor,
+                unit: Unit::Ratio,
+                magnitude: "share of the last move",
+                range: Range::Everywhere([0.5e-4, 10e-4]),
+                source: Source::Assumed,
+                softest: TENFOLD,
+                most: UNLIMITED,
+                one_signed: false,
+                sign_apart: false,
+                load: Load::None,
+                needs: &[Need::Moves],
+                known: Some(Known { hypotheses: unsettled_reading::hypotheses, misses: FIRST_ORDER, doubles: None, advice: &[] }),
+                may_repeat: false,
+                neighbours: &[Neighbour { kind: Kind::Creep, told_apart_by: ONE_BY_ONE }],
+                scene: SceneKeys { place: ScenePlace::Nowhere, required: &["lag_ppm"], optional: &[] },
+            },
             Kind::MeasurementOutliers => &Descriptor {
                 name: "measurement_outliers",
                 about: "some readings have a larger noise",
@@ -996,8 +1080,8 @@ mod tests {
         let schema = schemars::schema_for!(Shape);
         let shapes = schema.get("oneOf").and_then(Value::as_array).unwrap();
         let names: Vec<&str> = shapes.iter().filter_map(|shape| shape["properties"]["shape"]["const"].as_str()).collect();
-        assert_eq!((names.len(), shapes.len()), (37, 37), "{schema:?}");
-        assert_eq!((names[0], names[20], names[21], names[36]), ("torque", "gear", "unequal_bend", "time_curve"));
+        assert_eq!((names.len(), shapes.len()), (39, 39), "{schema:?}");
+        assert_eq!((names[0], names[23], names[24], names[38]), ("torque", "unsettled", "unequal_bend", "time_curve"));
         assert!(schema.get("anyOf").is_none());
     }
 

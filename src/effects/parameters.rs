@@ -28,6 +28,9 @@ pub struct Parameters {
     pub row: Option<usize>,
     /// Of outliers: their noise over that of the others.
     pub factor: Option<f64>,
+    /// Of what goes on after a move: time over which it fades, s; zero where it is gone by the next reading.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_constant_s: Option<f64>,
     /// Of a map: the angles of the joint at which errors are given, rad; straight between them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angles_rad: Option<Vec<f64>>,

@@ -69,6 +69,8 @@ pub struct Values {
     pub time_constant: f64,
     /// rad
     pub travel: f64,
+    /// Share of a move that is left at the reading.
+    pub lag: f64,
     /// kg
     pub excess: f64,
     /// Angles of a table of errors, rising, rad.

@@ -169,6 +169,9 @@ pub fn cases(arm: &Arm) -> Vec<Case> {
                 errors: (-10..=10).map(|step| 90.0 * ARCSEC * libm::sin(f64::from(step * step))).collect(),
             },
         ),
+        one("creep", joint(j2, "300 ppm, 60 s"), Effect::Creep { joint: j2, share: 3e-4, time_constant: 60.0 }),
+        one("direction_of_move", joint(j2, "1 µrad/(N·m)"), Effect::DirectionOfMove { joint: j2, gain: 1e-6 }),
+        one("unsettled_reading", "300 ppm".to_owned(), Effect::UnsettledReading { share: 3e-4 }),
         one(
             "worn_tooth_sector",
             joint(j2, "100 arcsec in 0.8 rad"),
@@ -647,6 +650,14 @@ impl<'a> Statics<'a> {
                 Effect::StrainWaveError { joint, amplitude, ratio, phase } => {
                     turn(joint, amplitude * libm::cos(2.0 * ratio * q[joint] + phase));
                 }
+                Effect::DirectionOfMove { joint, gain } => {
+                    turn(joint, -0.5 * gain * f64::from(row.planned.approach()[joint]) * torque(joint).abs());
+                }
+                Effect::UnsettledReading { share } => {
+                    for joint in 0..q.len() {
+                        turn(joint, -share * (q[joint] - row.planned.from[joint]));
+                    }
+                }
                 Effect::JointAngleMap { joint, ref angles, ref errors } => {
                     // Each line counts less the farther it is, up to the next one.
                     let near = |(at, angle): (usize, &f64)| {
@@ -669,7 +680,9 @@ impl<'a> Statics<'a> {
                         turn(joint, -depth * half * half);
                     }
                 }
-                Effect::CreepAfterMotion { joint, .. } | Effect::MemoryHysteresis { joint, .. } => turn(joint, *memory),
+                Effect::Creep { joint, .. } | Effect::CreepAfterMotion { joint, .. } | Effect::MemoryHysteresis { joint, .. } => {
+                    turn(joint, *memory)
+                }
                 Effect::LinkThermalGrowth { of, expansion } => {
                     let links = match of {
                         Growing::Link(link) => link + 1..link + 2,
@@ -763,6 +776,21 @@ impl<'a> Statics<'a> {
                     if let Some(next) = planned.get(index + 1) {
                         relax(&mut state, goals[index], next.time_s - next.dwell_s - row.time_s);
                     }
+                }
+                left
+            }
+            Effect::Creep { joint, share, time_constant } => {
+                // What is left fades in small steps from reading to reading, and each move adds its own.
+                let mut left: Vec<f64> = Vec::with_capacity(planned.len());
+                let mut state = 0.0;
+                for (index, row) in planned.iter().enumerate() {
+                    let pause = index.checked_sub(1).map_or(0.0, |before| row.time_s - planned[before].time_s);
+                    let steps = (pause / time_constant.max(1e-9) * 2000.0).clamp(1.0, 1e5).round();
+                    let h = (pause / steps / time_constant.max(1e-9)).min(1.0);
+                    (0..steps as usize).for_each(|_| state *= 1.0 - h + 0.5 * h * h);
+                    state = if time_constant > 0.0 { state } else { 0.0 };
+                    state -= share * (row.joints[joint] - row.from[joint]);
+                    left.push(state);
                 }
                 left
             }

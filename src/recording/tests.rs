@@ -257,6 +257,7 @@ fn diagnosis(stream: &mut Stream, readings: usize) -> Diagnosis {
         detail: String::new(),
     };
     let all = Parameters {
+        time_constant_s: Some(60.0),
         angles_rad: Some(vec![0.0, 0.1]),
         errors_rad: Some(vec![1e-4, -2e-4]),
         sigmas_rad: Some(vec![1e-5, 2e-5]),

@@ -205,6 +205,9 @@ fn reason(why: Reason) -> String {
         }
         Reason::TooSmall => "a realistic size is lost in the noise, or geometry absorbs it".to_owned(),
         Reason::NoApproach => "no approach directions were recorded".to_owned(),
+        Reason::NoMoves => {
+            "the arm came to its readings over points between, so that the length of the last move is not known".to_owned()
+        }
         Reason::OneSide => "the joint is always approached from the same side".to_owned(),
         Reason::NoTemperatures => "no temperatures that change were recorded".to_owned(),
         Reason::LoadedAlike => "gravity loads this joint not at all, or always alike".to_owned(),

@@ -115,9 +115,10 @@ fn values(file: &EffectToml, key: &str, place: Option<usize>, arm: &Arm) -> Chec
         depth: given("depth_arcsec", file.depth_arcsec, positive, LARGEST_TURN_ARCSEC)? * ARCSEC,
         centre: file.centre_deg.unwrap_or(0.0).to_radians(),
         half_width: given("half_width_deg", file.half_width_deg, positive, 180.0)?.to_radians(),
-        time_constant: given("time_constant_s", file.time_constant_s, positive, 1e6)?,
+        time_constant: given("time_constant_s", file.time_constant_s, not_negative, 1e6)?,
         travel: given("travel_deg", file.travel_deg, positive, 36e3)?.to_radians(),
         excess: signed("excess_kg", file.excess_kg, 1e3)?,
+        lag: signed("lag_ppm", file.lag_ppm, 1e5)? / 1e6,
         angles,
         errors,
     })

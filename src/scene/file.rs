@@ -668,6 +668,9 @@ pub struct EffectToml {
     /// Way over which the memory fades.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub travel_deg: Option<f64>,
+    /// Share of the last move that is left at the reading, parts per million.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lag_ppm: Option<f64>,
     /// Angles of a table of errors, rising.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angles_deg: Option<Vec<f64>>,

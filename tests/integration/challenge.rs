@@ -36,6 +36,7 @@ fn options() -> Options {
         withheld: Vec::new(),
         outside: 0,
         soft: false,
+        direct: false,
     }
 }
 

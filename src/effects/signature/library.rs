@@ -32,6 +32,8 @@ pub struct Hypothesis {
 pub struct Columns {
     /// Directions of the last moves.
     pub approach: bool,
+    /// Whether they lead straight from reading to reading.
+    pub moves: bool,
     /// Temperatures.
     pub temperature: bool,
     /// Orientations.

@@ -83,6 +83,8 @@ pub(in crate::effects) enum Recorded {
     Pose,
     /// From which side each joint was approached.
     Approach,
+    /// From where each joint came.
+    Moves,
     /// Temperatures.
     Temperatures,
 }
@@ -175,8 +177,6 @@ pub enum Family {
     NonlinearTorque,
     /// A torque that turns a joint slowly.
     TorqueMemory,
-    /// Approach times torque.
-    DirectionLoad,
     /// Past moves.
     Memory,
     /// A joint over time.
@@ -225,6 +225,9 @@ impl Course {
     }
 }
 
+/// Times over which what is left of a move fades, s; zero: it is gone by the next reading.
+pub const FADING_S: [f64; 4] = [0.0, 15.0, 60.0, 240.0];
+
 /// A row of measurements as signatures see it.
 #[derive(Clone, Debug)]
 pub struct Reading {
@@ -250,6 +253,9 @@ pub struct Reading {
     pub torque_memory: Vec<[f64; FORGETTING_S.len()]>,
     /// Free fall, m/s².
     pub gravity: Vector3<f64>,
+    /// Of each joint, its ways from reading to reading, each faded since its end over one of [`FADING_S`], rad or m; empty where moves are not
+    /// known.
+    pub behind: Vec<[f64; FADING_S.len()]>,
     /// Memory of each joint's moves, by [`MEMORIES`].
     pub memory: Vec<[f64; MEMORIES.len()]>,
 }
@@ -343,6 +349,7 @@ impl Shape {
         match self.follows().form(false).needs {
             Recorded::Pose => true,
             Recorded::Approach => !reading.approach.is_empty(),
+            Recorded::Moves => !reading.behind.is_empty(),
             Recorded::Temperatures => !reading.rise_k.is_empty(),
         }
     }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::folder::ChallengeError;
 use crate::design::candidates::{Rules, Sampler};
 use crate::design::search::split;
-use crate::effects::{Kind, Location};
+use crate::effects::{Kind, Location, Need};
 use crate::event::{Event, Start};
 use crate::lab::conditions::course;
 use crate::lab::detectability::{difference, geometry_of_cell, has_signal, noiseless, without};
@@ -64,6 +64,9 @@ pub struct Options {
     /// Magnitudes up to those of hobby and cable-driven arms ([`Descriptor::softest`](crate::effects::Descriptor::softest)).
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub soft: bool,
+    /// The arm comes to each configuration straight from the one before, so that lengths of moves are known.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub direct: bool,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for it so")]
@@ -88,6 +91,7 @@ impl Options {
             withheld: Vec::new(),
             outside: 0,
             soft: false,
+            direct: false,
         }
     }
 }
@@ -219,7 +223,7 @@ pub fn public(base: &SceneFile, options: &Options, key: &[u8; 32], index: usize)
 /// the scene's own plan is.
 fn conditions(file: &mut SceneFile, options: &Options) -> Result<(), ChallengeError> {
     let session_s = options.poses as f64 * file.scene.plan.seconds_per_pose;
-    file.set("plan.approach", "\"random\"")?;
+    file.set("plan.approach", if options.direct { "\"direct\"" } else { "\"random\"" })?;
     file.set("plan.payloads_kg", &format!("{PAYLOADS_KG:?}"))?;
     file.set("plan.payload_blocks", "false")?;
     file.set("plan.repeats", if options.repeats > 0 { "2" } else { "1" })?;
@@ -253,6 +257,8 @@ pub fn hidden(public: &Public, options: &Options, key: &[u8; 32], index: usize) 
     let which = stream.unit();
     let arm = &public.file.scene.arm;
     let mut choice: Vec<Kind> = options.kinds.iter().filter_map(|name| Kind::from_name(name)).collect();
+    // What hangs on the length of the last move looks like play where the arm always comes over a point beside.
+    choice.retain(|kind| options.direct || !kind.descriptor().needs.contains(&Need::Moves));
     if choice.len() > 1 {
         choice.retain(|kind| is_its_own(*kind, arm));
     }

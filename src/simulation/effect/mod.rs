@@ -17,7 +17,11 @@ pub(super) mod base_tilt;
 #[cfg(feature = "simulator")]
 mod bearing_clearance;
 #[cfg(feature = "simulator")]
+mod creep;
+#[cfg(feature = "simulator")]
 mod creep_after_motion;
+#[cfg(feature = "simulator")]
+pub(super) mod direction_of_move;
 #[cfg(feature = "simulator")]
 mod gear_coupling;
 #[cfg(feature = "simulator")]
@@ -48,6 +52,8 @@ pub(super) mod moment_crosstalk;
 mod strain_wave_error;
 #[cfg(feature = "simulator")]
 mod tool_step;
+#[cfg(feature = "simulator")]
+mod unsettled_reading;
 #[cfg(feature = "simulator")]
 mod worn_tooth_sector;
 #[cfg(feature = "simulator")]
@@ -213,6 +219,27 @@ pub enum Effect {
         /// Error at each of them, straight between them and none beyond, rad.
         errors: Vec<f64>,
     },
+    /// The output follows each move with a delay.
+    Creep {
+        /// Joint.
+        joint: usize,
+        /// Of a move, what is left at its reading.
+        share: f64,
+        /// Time over which it fades, s; zero: gone by the next reading.
+        time_constant: f64,
+    },
+    /// Friction that grows with the torque winds the output up against its last move.
+    DirectionOfMove {
+        /// Joint.
+        joint: usize,
+        /// Angle per torque, from side to side, rad/(N·m).
+        gain: f64,
+    },
+    /// Every output is behind by a share of the last move.
+    UnsettledReading {
+        /// Of the move.
+        share: f64,
+    },
     /// Some readings have a larger noise.
     MeasurementOutliers {
         /// Share of the readings, 0 to 1.
@@ -306,6 +333,9 @@ impl Effect {
             Effect::BaseTilt { compliance } => base_tilt::add(parts, checks, compliance),
             Effect::ToolStep { translation, rotation, after } => tool_step::add(parts, checks, (translation, rotation), after),
             Effect::JointAngleMap { joint, ref angles, ref errors } => joint_angle_map::add(parts, checks, joint, angles, errors),
+            Effect::Creep { joint, share, time_constant } => creep::add(parts, checks, joint, share, time_constant),
+            Effect::DirectionOfMove { joint, gain } => direction_of_move::add(parts, checks, joint, gain),
+            Effect::UnsettledReading { share } => unsettled_reading::add(parts, checks, share),
             Effect::MeasurementScale { scale } => measurement_scale::check(checks, scale),
             Effect::MeasurementOutliers { share, factor } => measurement_outliers::check(checks, share, factor),
             Effect::WornToothSector { joint, depth, centre, half_width } => {
@@ -363,6 +393,9 @@ impl Effect {
             Kind::BaseTilt => Effect::BaseTilt { compliance },
             Kind::ToolStep => Effect::ToolStep { translation, rotation, after },
             Kind::JointAngleMap => Effect::JointAngleMap { joint, angles: values.angles.clone(), errors: values.errors.clone() },
+            Kind::Creep => Effect::Creep { joint, share: values.lag, time_constant: values.time_constant },
+            Kind::DirectionOfMove => Effect::DirectionOfMove { joint, gain: values.gain },
+            Kind::UnsettledReading => Effect::UnsettledReading { share: values.lag },
             Kind::MeasurementScale => Effect::MeasurementScale { scale: values.scale },
             Kind::MeasurementOutliers => Effect::MeasurementOutliers { share: values.share, factor: values.factor },
             Kind::WornToothSector => {
@@ -438,6 +471,9 @@ impl Effect {
                 let (angles, errors) = graduation(magnitude, stream);
                 Effect::JointAngleMap { joint, angles, errors }
             }
+            Kind::Creep => Effect::Creep { joint, share: magnitude, time_constant: stream.uniform(5.0, 200.0) },
+            Kind::DirectionOfMove => Effect::DirectionOfMove { joint, gain: magnitude },
+            Kind::UnsettledReading => Effect::UnsettledReading { share: magnitude },
             Kind::MeasurementScale => Effect::MeasurementScale { scale: sign(stream) * magnitude },
             Kind::MeasurementOutliers => Effect::MeasurementOutliers { share: magnitude, factor: stream.uniform(6.0, 20.0) },
             Kind::WornToothSector => {
@@ -545,6 +581,9 @@ impl Effect {
             Effect::JointAngleMap { joint, ref errors, .. } => {
                 at(Kind::JointAngleMap, joint, statistics::rms(errors.iter().copied()))
             }
+            Effect::Creep { joint, share, time_constant } => at(Kind::Creep, joint, share).with("time_constant_s", time_constant),
+            Effect::DirectionOfMove { joint, gain } => at(Kind::DirectionOfMove, joint, gain),
+            Effect::UnsettledReading { share } => of(Kind::UnsettledReading, None, share),
             Effect::MeasurementScale { scale } => of(Kind::MeasurementScale, None, scale),
             Effect::MeasurementOutliers { share, factor } => of(Kind::MeasurementOutliers, None, share).with("factor", factor),
             Effect::WornToothSector { joint, depth, centre, half_width } => {

@@ -16,17 +16,11 @@ pub(super) fn add(parts: &mut Mechanisms, checks: &Checks<'_>, joint: usize, gai
 
 /// Turns each joint further by what its servo takes for a torque error: the moment of gravity on what it carries, about the x axis of its
 /// frame.
-pub(in crate::simulation) fn answer(
-    gains: &[f64],
-    arm: &TrueArm,
-    world: &World,
-    unloaded: &Placement,
-    placement: &mut Placement,
-) {
+pub(in crate::simulation) fn answer(gains: &[f64], arm: &TrueArm, world: &World, placement: &mut Placement) {
     for (joint, gain) in gains.iter().enumerate().filter(|(_, gain)| **gain != 0.0) {
         let base_from_joint = world.base_from_joint(joint);
         let moment = world.moment_about(arm, &base_from_joint.translation.vector, joint);
         let across = moment.dot(&(base_from_joint.rotation * Vector3::x()));
-        placement.joints[joint] = unloaded.joints[joint] + gain * across;
+        placement.joints[joint] += gain * across;
     }
 }

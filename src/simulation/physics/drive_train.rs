@@ -16,6 +16,7 @@ pub(in crate::simulation) struct Drive {
     /// Joints whose motion leaks, and how much of it.
     pub(in crate::simulation) leaks: Vec<(usize, f64)>,
     pub(in crate::simulation) graduations: Vec<Graduation>,
+    pub(in crate::simulation) fading: Vec<Fading>,
     pub(in crate::simulation) worn: Vec<WornSector>,
     pub(in crate::simulation) memories: Vec<Memory>,
     /// Drift of the zero with the temperature of the link that the joint moves, rad/K.
@@ -120,6 +121,29 @@ impl Graduation {
     }
 }
 
+/// An output that follows its motor with a delay.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::simulation) struct Fading {
+    /// Of a move, what is left at its reading.
+    pub(in crate::simulation) share: f64,
+    /// Over which it fades; zero: gone by the next reading.
+    pub(in crate::simulation) time_constant_s: f64,
+}
+
+impl Fading {
+    /// How far the output stands behind, rad or m.
+    fn behind(&self, joint: usize, conditions: &Conditions) -> f64 {
+        let last = conditions.joints[joint] - conditions.from[joint];
+        let left = |elapsed_s: f64| if self.time_constant_s > 0.0 { libm::exp(-elapsed_s / self.time_constant_s) } else { 0.0 };
+        let earlier: f64 = conditions
+            .history
+            .iter()
+            .map(|stop| (stop.joints[joint] - stop.from[joint]) * left(conditions.time_s - stop.time_s))
+            .sum();
+        self.share * (last + earlier)
+    }
+}
+
 /// A sector of worn teeth: the output stands behind where it should, most in the middle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::simulation) struct WornSector {
@@ -181,9 +205,10 @@ impl Drive {
         let waves: f64 = self.wave_generators.iter().map(|w| w.amplitude * libm::cos(2.0 * (w.ratio * q) + w.phase)).sum();
         let leaks: f64 = self.leaks.iter().map(|(source, coupling)| coupling * conditions.joints[*source]).sum();
         let graduations: f64 = self.graduations.iter().map(|graduation| graduation.beyond(q)).sum();
+        let fading: f64 = self.fading.iter().map(|fading| fading.behind(joint, conditions)).sum();
         let worn: f64 = self.worn.iter().map(|sector| sector.behind(q)).sum();
         let memories: f64 = self.memories.iter().map(|memory| memory.state(joint, conditions)).sum();
         let drift = self.zero_drift * conditions.rise_k[joint + 1];
-        q + (encoders + waves + self.ratio_error * q + leaks + graduations - worn + memories + drift)
+        q + (encoders + waves + self.ratio_error * q + leaks + graduations - fading - worn + memories + drift)
     }
 }

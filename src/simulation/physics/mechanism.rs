@@ -12,7 +12,7 @@ use super::world::World;
 use crate::arm::JointKind;
 use crate::arm::frames::{Pose, rotation_from_vector};
 use crate::effects::Location;
-use crate::simulation::effect::{Effect, base_tilt, moment_crosstalk};
+use crate::simulation::effect::{Effect, base_tilt, direction_of_move, moment_crosstalk};
 
 /// The parts.
 #[derive(Clone, Debug)]
@@ -44,6 +44,8 @@ pub(in crate::simulation) struct Mechanisms {
 pub(in crate::simulation) struct Reactions {
     /// Turn of each joint per moment about the x axis of its frame, rad/(N·m).
     pub(in crate::simulation) crosstalk: Vec<f64>,
+    /// Angle per torque by which each joint is wound up against its last move, from side to side, rad/(N·m).
+    pub(in crate::simulation) windup: Vec<f64>,
     /// Lean of the base per moment about its origin, rad/(N·m).
     pub(in crate::simulation) base_tilt: f64,
 }
@@ -51,12 +53,14 @@ pub(in crate::simulation) struct Reactions {
 impl Reactions {
     /// Whether nothing answers.
     pub(in crate::simulation) fn is_none(&self) -> bool {
-        self.base_tilt == 0.0 && self.crosstalk.iter().all(|gain| *gain == 0.0)
+        self.base_tilt == 0.0 && self.crosstalk.iter().chain(&self.windup).all(|gain| *gain == 0.0)
     }
 
     /// Moves what is to be placed: `unloaded` as it would be without a load, under the load of the arm as `world` has last placed it.
     pub(in crate::simulation) fn answer(&self, arm: &TrueArm, world: &World, unloaded: &Placement, placement: &mut Placement) {
-        moment_crosstalk::answer(&self.crosstalk, arm, world, unloaded, placement);
+        placement.joints.clone_from(&unloaded.joints);
+        moment_crosstalk::answer(&self.crosstalk, arm, world, placement);
+        direction_of_move::answer(&self.windup, arm, world, placement);
         base_tilt::answer(self.base_tilt, arm, world, unloaded, placement);
     }
 }
@@ -195,7 +199,7 @@ impl Mechanisms {
             base_shifts: Vec::new(),
             tool_shifts: Vec::new(),
             excess_kg: 0.0,
-            reactions: Reactions { crosstalk: vec![0.0; count], base_tilt: 0.0 },
+            reactions: Reactions { crosstalk: vec![0.0; count], windup: vec![0.0; count], base_tilt: 0.0 },
         };
         for effect in effects {
             effect.add(&mut parts, &Checks { kinds, effect: effect.name(), location: effect.location() })?;

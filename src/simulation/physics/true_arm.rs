@@ -57,6 +57,8 @@ pub(in crate::simulation) struct TrueArm {
 pub(in crate::simulation) struct Placement {
     /// Outputs of the drive trains, rad or m.
     pub(in crate::simulation) joints: Vec<f64>,
+    /// Direction of each joint's last move: 1, −1, or 0 where it stood.
+    pub(in crate::simulation) directions: Vec<f64>,
     /// Growth of each segment, base to first joint first; 1 where nothing grows.
     pub(super) growth: Vec<f64>,
     /// `world_from_base`: where the base has moved to.
@@ -65,6 +67,11 @@ pub(in crate::simulation) struct Placement {
     pub(super) tool_shift: Option<Pose>,
     /// Mass at the tool's origin, kg.
     pub(in crate::simulation) payload_kg: f64,
+}
+
+/// 1, −1, or 0 where nothing moved.
+fn direction(way: f64) -> f64 {
+    if way == 0.0 { 0.0 } else { way.signum() }
 }
 
 /// Loads below which the friction of a fit keeps it where it is.
@@ -152,6 +159,7 @@ impl TrueArm {
         let share = conditions.share();
         Placement {
             joints: self.drives.iter().enumerate().map(|(joint, drive)| drive.output(joint, conditions)).collect(),
+            directions: conditions.joints.iter().zip(conditions.from).map(|(to, from)| direction(to - from)).collect(),
             growth: self.growth(conditions.rise_k),
             base_shift: shifted(&self.base_shifts, share),
             tool_shift: shifted(&self.tool_shifts, share),

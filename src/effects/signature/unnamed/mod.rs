@@ -6,7 +6,6 @@ pub mod angle_map;
 pub mod bump;
 pub mod course;
 pub mod crosstalk;
-pub mod direction_load;
 mod harmonic;
 pub mod memory;
 pub mod nonlinear_torque;
@@ -25,7 +24,6 @@ use angle_map::AngleMap;
 use bump::Bump;
 use course::{BaseCourse, ToolCourse};
 use crosstalk::Crosstalk;
-use direction_load::DirectionLoad;
 use memory::Memory;
 use nonlinear_torque::{Hardening, Softening};
 use time_curve::TimeCurve;
@@ -60,7 +58,6 @@ pub enum Nameless {
     Hardening(Hardening),
     TorqueMemory(TorqueMemory),
     AllYield(AllYield),
-    DirectionLoad(DirectionLoad),
     Memory(Memory),
     TimeCurve(TimeCurve),
 }
@@ -81,7 +78,6 @@ impl Nameless {
             Nameless::Hardening(of) => of,
             Nameless::TorqueMemory(of) => of,
             Nameless::AllYield(of) => of,
-            Nameless::DirectionLoad(of) => of,
             Nameless::Memory(of) => of,
             Nameless::TimeCurve(of) => of,
         }
@@ -113,5 +109,4 @@ pub(super) fn hypotheses(site: &Site<'_>, all: &mut Vec<Hypothesis>) {
     torque_memory::hypotheses(site, joint, all);
     memory::hypotheses(site, joint, all);
     time_curve::hypotheses(site, joint, all);
-    direction_load::hypotheses(site, joint, all);
 }
