@@ -1,5 +1,7 @@
 //! Conditions of each row, as far as they were recorded, and what follows from what is missing.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -113,6 +115,7 @@ pub(crate) fn conditions(
             order: order[row],
             torque_memory: vec![[0.0; FORGETTING_S.len()]; count],
             gravity: measurement.gravity(&rows.mechanism.gravity),
+            begins: false,
             behind: if moves.is_some() { vec![[0.0; FADING_S.len()]; count] } else { Vec::new() },
             memory: vec![[0.0; MEMORIES.len()]; count],
         });
@@ -152,11 +155,18 @@ pub(crate) fn conditions(
         orientation: rows.equations.has_orientation(),
         time,
         rows: total,
+        configurations: configurations(measurements),
         travel,
         upright,
         changes: if time { changes } else { Vec::new() },
     };
     (Conditions { readings, columns, notes, in_time }, displacement)
+}
+
+/// How many configurations there are.
+fn configurations(measurements: &[&Measurement]) -> usize {
+    let rounded = |row: &&Measurement| row.joints.iter().map(|value| (value / STOOD).round() as i64).collect::<Vec<_>>();
+    measurements.iter().map(rounded).collect::<BTreeSet<_>>().len()
 }
 
 /// Movement of a joint from reading to reading below which it stood, rad or m.
@@ -196,6 +206,7 @@ fn fall_behind(measurements: &[&Measurement], in_time: &[usize], moves: &[Vec<f6
             }
         }
         readings[*row].behind.clone_from(&behind);
+        readings[*row].begins = begins;
         before = Some(now);
     }
 }

@@ -40,7 +40,7 @@ pub(super) fn magnitude(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -
     let load = is_driven_by_load(of.kind) && !analysis.linear.rows.mechanism.masses_known;
     let name = if load { RELATIVE.to_owned() } else { name };
     let settings = &analysis.options.settings.decision;
-    let model = model_sigma(of.kind, settings);
+    let model = if of.shape.size() == Size::Rms { settings.free_signature } else { model_sigma(of.kind, settings) };
     if width == 1 {
         let (mean, sigma) = (value(0), libm::hypot(libm::sqrt(covariance(0, 0)), model * value(0).abs()));
         let interval = [mean - quantile * sigma, mean + quantile * sigma];

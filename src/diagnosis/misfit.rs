@@ -12,11 +12,20 @@ use super::search::{Belief, Found};
 use crate::effects::signature::library::Hypothesis;
 use crate::effects::signature::shape::Size;
 
-/// Whether what `rough` does not say of its cause may look like `named`: a shape without a name in the same joint, or on the link that
-/// this one moves; or a map of the joint's angle, which knows nothing finer than its values, beside another function of that angle.
-fn is_beside(rough: &Hypothesis, named: &Hypothesis) -> bool {
-    let finer = rough.shape.size() == Size::Rms && named.shape.size() != Size::Rms && named.shape.of_angle().is_some();
-    (rough.kind.is_none() || finer) && rough.location.index.is_some() && rough.location.index == named.location.index
+/// Whether `fine` may be what `rough` does not say of a map: `rough` follows the joint's angle freely and knows nothing finer than its
+/// values, `fine` is another function of that angle.
+fn is_finer(rough: &Hypothesis, fine: &Hypothesis) -> bool {
+    rough.shape.size() == Size::Rms
+        && fine.shape.size() != Size::Rms
+        && fine.shape.of_angle().is_some()
+        && rough.location.index == fine.location.index
+}
+
+/// Whether what `rough` does not say of its cause may look like `of`: a shape without a name beside a name in the same joint, or on the
+/// link that this one moves; or a map beside anything finer.
+fn is_beside(rough: &Hypothesis, of: &Hypothesis) -> bool {
+    let unnamed = rough.kind.is_none() && of.kind.is_some() && rough.location.index.is_some();
+    is_finer(rough, of) || (unnamed && rough.location.index == of.location.index)
 }
 
 /// `found` with the probability of each name shared with the unknown beside it.
@@ -29,7 +38,7 @@ pub(super) fn doubt(evidence: &Evidence<'_>, mut found: Found) -> Found {
         let mut others = found.best.clone();
         others.remove(number);
         let beside = |other: usize| is_beside(&hypotheses[other], named);
-        let Some((unknown, _)) = others.iter().find(|(other, _)| beside(*other)).copied().filter(|_| named.kind.is_some()) else {
+        let Some((unknown, _)) = others.iter().find(|(other, _)| beside(*other)).copied() else {
             continue;
         };
         let cancelled = evidence.cancelled(&found.best, beside, *hypothesis);

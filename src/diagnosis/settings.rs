@@ -353,6 +353,8 @@ settings! {
         load_signature: f64 = 7e-3 => SHARE,
         /// The same of other signatures.
         signature: f64 = 2e-3 => SHARE,
+        /// The same of the root mean square of a free function: it hangs on which angles were read, and geometry takes a part of it.
+        free_signature: f64 = 0.05 => SHARE,
         /// Mean squares of the residual, over the declared one, that are nothing to speak of: least and most.
         usual_noise: [f64; 2] = [0.44, 2.25] => 0.0..=MANY,
         /// Held-out RMS over what is left of the readings used, from which on the readings are too few.

@@ -236,6 +236,8 @@ const KNOCKED: f64 = 50.0;
 const FIRST_ORDER: Misses = Misses { fitted: 0.005, as_said: 2e-3 };
 /// Straight between values some degrees apart.
 const STRAIGHT_BETWEEN: Misses = Misses { fitted: 0.25, as_said: 0.25 };
+/// It fades over one of a few times.
+const FADING: Misses = Misses { fitted: 0.1, as_said: 2e-3 };
 /// A deflected arm bends its own torques.
 const DEFLECTED: Misses = Misses { fitted: 0.01, as_said: 0.02 };
 /// Where the load that seats is as small as it is unknown, or near to what friction holds, the formula knows the side less well.
@@ -753,7 +755,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::None,
                 needs: &[Need::Moves],
-                known: Some(Known { hypotheses: creep::hypotheses, misses: FIRST_ORDER, doubles: None, advice: &[] }),
+                known: Some(Known { hypotheses: creep::hypotheses, misses: FADING, doubles: None, advice: &[] }),
                 may_repeat: false,
                 neighbours: &[
                     Neighbour { kind: Kind::Backlash, told_apart_by: LONG_AND_SHORT },

@@ -558,7 +558,13 @@ mod tests {
     #[test]
     fn every_variant_of_every_kind_is_tested_as_it_was_diagnosed() {
         const ROWS: usize = 40;
-        let (scene, rows) = readings(Vec::new(), ROWS);
+        let (scene, injected) = scene();
+        // Straight from reading to reading, so that every kind can be there.
+        let mut planned = session(&scene.arm, ROWS, 9);
+        for row in 1..ROWS {
+            planned[row].from = planned[row - 1].joints.clone();
+        }
+        let rows = measure(&scene.cell(), &injected, &planned, planned.len(), &mut Silent).unwrap().0;
         let rows: Vec<&Measurement> = rows.iter().collect();
         let settings = crate::diagnosis::settings::Settings::default();
         let waterfall = Waterfall::new(&scene.arm, &scene.sensor, &rows, &[], &settings).unwrap();

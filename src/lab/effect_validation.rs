@@ -255,7 +255,8 @@ pub fn validate(scene: &Scene, case: &Case, planned: &[Planned]) -> Result<Line,
 }
 
 fn of_the_sensor(effect: &Effect) -> bool {
-    effect.location().level == Level::Sensor
+    // What is read too early is the arm's.
+    (effect.location().level == Level::Sensor && !matches!(effect, Effect::UnsettledReading { .. }))
         || matches!(effect, Effect::BaseDrift { moves: Moves::Sensor, .. } | Effect::BaseStep { moves: Moves::Sensor, .. })
 }
 

@@ -19,7 +19,7 @@ use crate::simulation::injected::{Injected, Noise};
 
 #[test]
 fn every_signature_is_what_physics_makes() {
-    let options = Options::quiet(20e-6, 60, 0);
+    let options = Options { direct: true, ..Options::quiet(20e-6, 150, 0) };
     let public = case::public(&arm8().unwrap(), &options, &case::key(5), 0).unwrap();
     let scene = &public.file.scene;
     let hidden = case::hidden(&public, &options, &case::key(5), 0).injected;

@@ -40,8 +40,8 @@ impl Follows for Behind {
 }
 
 impl Named for Behind {
-    fn undecided(&self, _: &Reading) -> bool {
-        false
+    fn undecided(&self, reading: &Reading) -> bool {
+        reading.begins
     }
 
     fn parameters(&self, _: Coefficients<'_>) -> Parameters {

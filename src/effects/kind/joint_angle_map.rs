@@ -14,8 +14,6 @@ use crate::effects::{Kind, Parameters, Values};
 const SPACINGS_DEG: [f64; 2] = [10.0, 3.0];
 /// Fewer values are a polynomial.
 const FEWEST: usize = 4;
-/// Readings per value at least.
-const READINGS: usize = 2;
 
 /// \[`values`\] An error of a joint's angle, given at even angles and straight between them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -87,7 +85,8 @@ pub(in crate::effects) fn hypotheses(site: &Site<'_>, all: &mut Vec<Hypothesis>)
         let spacing = spacing_deg.to_radians();
         let [from, to] = [libm::floor(low / spacing), libm::ceil(high / spacing)];
         let values = (to - from) as usize + 1;
-        if values < FEWEST || READINGS * values > site.columns.rows {
+        // With more values than configurations each would have its own.
+        if values < FEWEST || values > site.columns.configurations {
             continue;
         }
         let table = AngleTable { joint, first: from * spacing, spacing, values };

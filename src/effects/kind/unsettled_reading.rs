@@ -27,8 +27,8 @@ impl Follows for Unsettled {
 }
 
 impl Named for Unsettled {
-    fn undecided(&self, _: &Reading) -> bool {
-        false
+    fn undecided(&self, reading: &Reading) -> bool {
+        reading.begins
     }
 
     fn parameters(&self, _: Coefficients<'_>) -> Parameters {

@@ -42,6 +42,8 @@ pub struct Columns {
     pub time: bool,
     /// Rows in time.
     pub rows: usize,
+    /// Configurations that differ.
+    pub configurations: usize,
     /// Smallest and largest coordinate of each joint.
     pub travel: Vec<[f64; 2]>,
     /// Joints whose torque is not known to differ from zero in any reading.

@@ -226,7 +226,7 @@ impl Course {
 }
 
 /// Times over which what is left of a move fades, s; zero: it is gone by the next reading.
-pub const FADING_S: [f64; 4] = [0.0, 15.0, 60.0, 240.0];
+pub const FADING_S: [f64; 7] = [0.0, 7.0, 15.0, 30.0, 60.0, 120.0, 240.0];
 
 /// A row of measurements as signatures see it.
 #[derive(Clone, Debug)]
@@ -253,6 +253,8 @@ pub struct Reading {
     pub torque_memory: Vec<[f64; FORGETTING_S.len()]>,
     /// Free fall, m/s².
     pub gravity: Vector3<f64>,
+    /// Whether it is the first of a session: nobody knows from where the arm came.
+    pub begins: bool,
     /// Of each joint, its ways from reading to reading, each faded since its end over one of [`FADING_S`], rad or m; empty where moves are not
     /// known.
     pub behind: Vec<[f64; FADING_S.len()]>,

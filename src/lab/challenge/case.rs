@@ -215,7 +215,13 @@ pub fn public(base: &SceneFile, options: &Options, key: &[u8; 32], index: usize)
     let rules = Rules::measurable(&scene.arm, &scene.sensor);
     let drawn = Sampler::new(&rules).draw(&mut stream, configurations).map_err(SessionError::from)?;
     let chosen = split(&drawn, scene.arm.joint_count());
-    let planned = thinned(plan(&scene.cell(), &chosen, &[]), options.repeats, scene.plan.seconds_per_pose);
+    let mut planned = thinned(plan(&scene.cell(), &chosen, &[]), options.repeats, scene.plan.seconds_per_pose);
+    if options.direct {
+        // Straight from the reading before among those that are left.
+        for row in 1..planned.len() {
+            planned[row].from = planned[row - 1].joints.clone();
+        }
+    }
     Ok(Public { file, planned })
 }
 
