@@ -86,7 +86,12 @@ mod tests {
                 yields + if of == (if same { 2 } else { 4 }) { unknown } else { 0.0 }
             },
             |analysis| {
-                let evidence = &analysis.evidence;
+                // A map would have a name for the unknown.
+                let mut candidates = analysis.evidence.candidates.clone();
+                for (active, of) in candidates.active.iter_mut().zip(&candidates.hypotheses) {
+                    *active &= of.kind != Some(Kind::JointAngleMap);
+                }
+                let evidence = &Evidence { candidates: &candidates, ..analysis.evidence };
                 let found = search(evidence, &[], 6);
                 let of = |found: &Found| {
                     let is = |belief: &&Belief| belief.claim.0 == Some(Kind::JointCompliance) && belief.claim.1.index == Some(3);

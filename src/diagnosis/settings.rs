@@ -197,7 +197,7 @@ settings! {
         /// Moments of a step that are tried at most.
         change_points: usize = 80 => 1.0..=MANY,
         /// Share of the readings that a step leaves before it and after it at least.
-        change_margin: f64 = 0.1 => 0.0..=0.5,
+        change_margin: f64 = 0.02 => 0.0..=0.5,
         /// The same as a number of readings: fewer do not tell where the base then stands.
         change_margin_readings: usize = 3 => 1.0..=MANY,
         /// Fitted errors of a frame over their prior's sigma beyond which it is another robot, or its readings are wrong.

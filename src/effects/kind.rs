@@ -626,7 +626,7 @@ impl Kind {
                     doubles: None,
                     advice: &[Advice::Alone(Measure::OtherOrientations)],
                 }),
-                may_repeat: false,
+                may_repeat: true,
                 neighbours: &[
                     Neighbour { kind: Kind::ToolStep, told_apart_by: OTHER_ORIENTATIONS },
                     Neighbour { kind: Kind::BaseDrift, told_apart_by: SPREAD_OVER_TIME },
@@ -684,7 +684,7 @@ impl Kind {
                     doubles: None,
                     advice: &[Advice::Alone(Measure::OtherOrientations)],
                 }),
-                may_repeat: false,
+                may_repeat: true,
                 neighbours: &[Neighbour { kind: Kind::BaseStep, told_apart_by: OTHER_ORIENTATIONS }],
                 scene: SceneKeys {
                     place: ScenePlace::Nowhere,

@@ -353,11 +353,12 @@ impl Simulator {
         let of_row = |(place, row): (usize, &usize)| {
             let (measurement, reading) = (measurements[*row], &readings[*row]);
             let before = place.checked_sub(1).map_or(measurement, |before| measurements[in_time[before]]);
+            let moves = waterfall.conditions.columns.moves;
             let from = (0..reading.joints.len())
                 .map(|joint| match measurement.approach.get(joint) {
-                    Some(side) => reading.joints[joint] - f64::from(*side) * TRAVEL[usize::from(reading.slides[joint])],
+                    Some(side) if !moves => reading.joints[joint] - f64::from(*side) * TRAVEL[usize::from(reading.slides[joint])],
                     // Straight from the reading before.
-                    None => before.joints[joint],
+                    _ => before.joints[joint],
                 })
                 .collect();
             let warm = !reading.rise_k.is_empty();

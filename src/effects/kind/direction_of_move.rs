@@ -53,7 +53,5 @@ pub(in crate::effects) fn hypotheses(site: &Site<'_>, all: &mut Vec<Hypothesis>)
     let Some(joint) = site.place.filter(|_| site.columns.approach) else {
         return;
     };
-    if site.columns.upright.get(joint) != Some(&true) {
-        all.push(site.hypothesis(Kind::DirectionOfMove, Shape::DirectionLoad(DirectionLoad { joint })));
-    }
+    all.push(site.hypothesis(Kind::DirectionOfMove, Shape::DirectionLoad(DirectionLoad { joint })));
 }

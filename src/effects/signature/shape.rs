@@ -225,8 +225,8 @@ impl Course {
     }
 }
 
-/// Times over which what is left of a move fades, s; zero: it is gone by the next reading.
-pub const FADING_S: [f64; 7] = [0.0, 7.0, 15.0, 30.0, 60.0, 120.0, 240.0];
+/// Times over which what is left of a move fades, s; zero: it is gone by the next reading. Between two neighbours lie 5 % of what it does.
+pub const FADING_S: [f64; 13] = [0.0, 5.0, 7.0, 10.0, 14.0, 20.0, 28.0, 40.0, 56.0, 80.0, 112.0, 160.0, 225.0];
 
 /// A row of measurements as signatures see it.
 #[derive(Clone, Debug)]
