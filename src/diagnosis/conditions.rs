@@ -115,7 +115,7 @@ pub(crate) fn conditions(
             order: order[row],
             torque_memory: vec![[0.0; FORGETTING_S.len()]; count],
             gravity: measurement.gravity(&rows.mechanism.gravity),
-            begins: false,
+            since_begin_s: 0.0,
             behind: if moves.is_some() { vec![[0.0; FADING_S.len()]; count] } else { Vec::new() },
             memory: vec![[0.0; MEMORIES.len()]; count],
         });
@@ -194,7 +194,7 @@ fn straight_moves(measurements: &[&Measurement], in_time: &[usize]) -> Option<Ve
 /// What is left of each joint's moves at each reading.
 fn fall_behind(measurements: &[&Measurement], in_time: &[usize], moves: &[Vec<f64>], readings: &mut [Reading]) {
     let mut behind = readings.first().map_or_else(Vec::new, |reading| reading.behind.clone());
-    let mut before: Option<&Measurement> = None;
+    let (mut before, mut begin_s): (Option<&Measurement>, f64) = (None, 0.0);
     for row in in_time {
         let now = measurements[*row];
         let pause = before.map_or(0.0, |before| (now.time_s - before.time_s).max(0.0));
@@ -206,7 +206,8 @@ fn fall_behind(measurements: &[&Measurement], in_time: &[usize], moves: &[Vec<f6
             }
         }
         readings[*row].behind.clone_from(&behind);
-        readings[*row].begins = begins;
+        begin_s = if begins { now.time_s } else { begin_s };
+        readings[*row].since_begin_s = now.time_s - begin_s;
         before = Some(now);
     }
 }

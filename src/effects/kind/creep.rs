@@ -11,7 +11,8 @@ use crate::effects::signature::shape::{
 };
 use crate::effects::{Kind, Parameters, Values};
 
-/// \[1\] A joint is behind by a share of its ways from reading to reading, each faded since.
+/// \[1, 2 where more than the last move counts\] A joint is behind by a share of its ways from reading to reading, each faded since; and by
+/// what was left of those before the first.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Behind {
     /// Joint, or the link that it moves.
@@ -31,17 +32,27 @@ impl Behind {
 
 impl Follows for Behind {
     fn form(&self, _: bool) -> Form {
-        Form { columns: 1, of_magnitude: 1, size: Size::Length, needs: Recorded::Moves, unnamed: None }
+        Form {
+            columns: if self.which == 0 { 1 } else { 2 },
+            of_magnitude: 1,
+            size: Size::Length,
+            needs: Recorded::Moves,
+            unnamed: None,
+        }
     }
 
     fn columns(&self, reading: &Reading, _: bool) -> Vec<Displacement> {
-        vec![reading.moved(self.joint, -reading.behind[self.joint][self.which.min(FADING_S.len() - 1)])]
+        let own = reading.moved(self.joint, -reading.behind[self.joint][self.which.min(FADING_S.len() - 1)]);
+        if self.which == 0 {
+            return vec![own];
+        }
+        vec![own, reading.moved(self.joint, -libm::exp(-reading.since_begin_s / self.fading_s()))]
     }
 }
 
 impl Named for Behind {
     fn undecided(&self, reading: &Reading) -> bool {
-        reading.begins
+        reading.since_begin_s == 0.0
     }
 
     fn parameters(&self, _: Coefficients<'_>) -> Parameters {
@@ -59,6 +70,7 @@ pub(in crate::effects) fn hypotheses(site: &Site<'_>, all: &mut Vec<Hypothesis>)
     };
     for (which, time) in FADING_S.iter().enumerate() {
         let detail = if which == 0 { "gone by the next reading".to_owned() } else { format!("fading over about {time:.0} s") };
-        all.push(Hypothesis { detail, ..site.hypothesis(Kind::Creep, Shape::Behind(Behind { joint, which })) });
+        let spread = vec![1.0; if which == 0 { 1 } else { 2 }];
+        all.push(Hypothesis { detail, spread, ..site.hypothesis(Kind::Creep, Shape::Behind(Behind { joint, which })) });
     }
 }

@@ -28,7 +28,7 @@ impl Follows for Unsettled {
 
 impl Named for Unsettled {
     fn undecided(&self, reading: &Reading) -> bool {
-        reading.begins
+        reading.since_begin_s == 0.0
     }
 
     fn parameters(&self, _: Coefficients<'_>) -> Parameters {

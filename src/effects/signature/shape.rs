@@ -253,8 +253,8 @@ pub struct Reading {
     pub torque_memory: Vec<[f64; FORGETTING_S.len()]>,
     /// Free fall, m/s².
     pub gravity: Vector3<f64>,
-    /// Whether it is the first of a session: nobody knows from where the arm came.
-    pub begins: bool,
+    /// Since the first reading of its session, to which nobody knows from where the arm came, s.
+    pub since_begin_s: f64,
     /// Of each joint, its ways from reading to reading, each faded since its end over one of [`FADING_S`], rad or m; empty where moves are not
     /// known.
     pub behind: Vec<[f64; FADING_S.len()]>,
