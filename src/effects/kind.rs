@@ -236,7 +236,7 @@ const KNOCKED: f64 = 50.0;
 const FIRST_ORDER: Misses = Misses { fitted: 0.005, as_said: 2e-3 };
 /// Straight between values some degrees apart.
 const STRAIGHT_BETWEEN: Misses = Misses { fitted: 0.25, as_said: 0.25 };
-/// It fades over one of a few times.
+/// It fades over one of a few times, and nobody knows from where the arm came to the first reading.
 const FADING: Misses = Misses { fitted: 0.1, as_said: 2e-3 };
 /// A deflected arm bends its own torques.
 const DEFLECTED: Misses = Misses { fitted: 0.01, as_said: 0.02 };
@@ -796,7 +796,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::None,
                 needs: &[Need::Moves],
-                known: Some(Known { hypotheses: unsettled_reading::hypotheses, misses: FIRST_ORDER, doubles: None, advice: &[] }),
+                known: Some(Known { hypotheses: unsettled_reading::hypotheses, misses: FADING, doubles: None, advice: &[] }),
                 may_repeat: false,
                 neighbours: &[Neighbour { kind: Kind::Creep, told_apart_by: ONE_BY_ONE }],
                 scene: SceneKeys { place: ScenePlace::Nowhere, required: &["lag_ppm"], optional: &[] },

@@ -356,7 +356,9 @@ impl Simulator {
             let moves = waterfall.conditions.columns.moves;
             let from = (0..reading.joints.len())
                 .map(|joint| match measurement.approach.get(joint) {
-                    Some(side) if !moves => reading.joints[joint] - f64::from(*side) * TRAVEL[usize::from(reading.slides[joint])],
+                    Some(side) if !moves || place == 0 => {
+                        reading.joints[joint] - f64::from(*side) * TRAVEL[usize::from(reading.slides[joint])]
+                    }
                     // Straight from the reading before.
                     _ => before.joints[joint],
                 })
@@ -582,7 +584,16 @@ mod tests {
             seen.insert(kind);
             let size = (hypothesis.range[0] * hypothesis.range[1]).sqrt();
             let coefficients: Vec<f64> = (0..hypothesis.shape.width(orientation))
-                .map(|at| if kind == Kind::Backlash { -size } else { size * [1.0, -0.6, 0.3, 0.5, 0.8, -0.7][at % 6] })
+                // What was left of moves before the first reading cannot be made anew.
+                .map(|at| {
+                    if kind == Kind::Creep && at > 0 {
+                        0.0
+                    } else if kind == Kind::Backlash {
+                        -size
+                    } else {
+                        size * [1.0, -0.6, 0.3, 0.5, 0.8, -0.7][at % 6]
+                    }
+                })
                 .collect();
             let effect = named(hypothesis, &coefficients, ROWS);
             // Through JSON, as it is recorded.

@@ -9,9 +9,9 @@ use crate::diagnosis::conditions::conditions;
 use crate::diagnosis::deflection::Loads;
 use crate::diagnosis::rows::{Readings, fit};
 use crate::diagnosis::settings::Model;
-use crate::effects::Kind;
 use crate::effects::signature::library::library;
 use crate::effects::signature::posture::Mechanism;
+use crate::effects::{Kind, Need};
 use crate::lab::reproduce::arms::arm8;
 use crate::seed::stream;
 use crate::simulation::effect::Effect;
@@ -19,10 +19,30 @@ use crate::simulation::injected::{Injected, Noise};
 
 #[test]
 fn every_signature_is_what_physics_makes() {
-    let options = Options { direct: true, ..Options::quiet(20e-6, 150, 0) };
-    let public = case::public(&arm8().unwrap(), &options, &case::key(5), 0).unwrap();
+    let elsewhere = |kind: &Kind| needs_moves(*kind) || *kind == Kind::JointAngleMap;
+    check(&Options::quiet(20e-6, 60, 0), Kind::known().filter(|kind| !elsewhere(kind)));
+}
+
+/// Over moves straight from reading to reading.
+#[test]
+fn so_is_that_of_what_follows_moves() {
+    check(&Options { direct: true, ..Options::quiet(20e-6, 60, 0) }, Kind::known().filter(|kind| needs_moves(*kind)));
+}
+
+/// Over angles that lie dense enough.
+#[test]
+fn so_is_that_of_a_map() {
+    check(&Options::quiet(20e-6, 150, 0), std::iter::once(Kind::JointAngleMap));
+}
+
+fn needs_moves(kind: Kind) -> bool {
+    kind.descriptor().needs.contains(&Need::Moves)
+}
+
+fn check(options: &Options, kinds: impl Iterator<Item = Kind>) {
+    let public = case::public(&arm8().unwrap(), options, &case::key(5), 0).unwrap();
     let scene = &public.file.scene;
-    let hidden = case::hidden(&public, &options, &case::key(5), 0).injected;
+    let hidden = case::hidden(&public, options, &case::key(5), 0).injected;
     let nothing = Injected { effects: Vec::new(), length_error_m: 0.0, angle_error_rad: 0.0, noise: Noise::Off, ..hidden };
     let mut wrong = Vec::new();
     let plain = noiseless(scene, &nothing, &public.planned).unwrap();
@@ -49,7 +69,7 @@ fn every_signature_is_what_physics_makes() {
         assert!(one.kind.is_some() || one.shape.unnamed().is_some(), "{one:?} has neither a name nor a family");
         assert!(one.shape.magnitude_width() <= widths[0]);
     }
-    for kind in Kind::known() {
+    for kind in kinds {
         for place in places(kind, &scene.arm) {
             let magnitude = kind.range(place, scene.arm.joint_count())[1];
             let effect = Effect::drawn(kind, place, magnitude, &scene.arm, &mut stream(4, kind.name()));
