@@ -405,14 +405,7 @@ impl<'a> Fitted<'a> {
     #[must_use]
     pub(super) fn surviving(&self, columns: &[usize], without: &[usize]) -> DMatrix<f64> {
         let beside = self.beside(without);
-        let size = columns.len();
-        let mut left = DMatrix::zeros(size, size);
-        for (i, column) in columns.iter().enumerate() {
-            let row = self.evidence.marginal.row(*column);
-            for (j, other) in columns.iter().enumerate() {
-                left[(i, j)] = row[*other];
-            }
-        }
+        let mut left = self.evidence.marginal.between(columns);
         let mut add = |sign: f64, with: &[f64], taken: &[f64]| {
             for (j, other) in columns.iter().enumerate() {
                 for (i, column) in columns.iter().enumerate() {

@@ -425,6 +425,31 @@ impl<'a> Marginal<'a> {
         asked
     }
 
+    /// What survives of `these` columns with each other: where nobody asks for those with all others, far less than [`Marginal::row`].
+    #[must_use]
+    pub(crate) fn between(&self, these: &[usize]) -> DMatrix<f64> {
+        let known: Vec<Option<Arc<Vec<f64>>>> = match self.rows.read() {
+            Ok(rows) => these.iter().map(|number| rows.get(number).cloned()).collect(),
+            Err(_) => vec![None; these.len()],
+        };
+        let folds = || self.products.folds.iter().enumerate().filter(|(number, _)| Some(*number) != self.left_out);
+        let mut between = DMatrix::zeros(these.len(), these.len());
+        for (i, a) in these.iter().enumerate() {
+            for (j, b) in these.iter().enumerate().skip(i) {
+                let value = match (&known[i], &known[j]) {
+                    (Some(row), _) => row[*b],
+                    (None, Some(row)) => row[*a],
+                    (None, None) => {
+                        let all: f64 = folds().map(|(_, fold)| dot(fold.signature(*a), fold.signature(*b))).sum();
+                        all - dot(column(&self.mixed, *a), column(&self.absorbed, *b))
+                    }
+                };
+                (between[(i, j)], between[(j, i)]) = (value, value);
+            }
+        }
+        between
+    }
+
     /// What survives of columns `i` and `j` of `hypothesis`, counted from its first.
     #[must_use]
     pub(crate) fn own(&self, hypothesis: usize, i: usize, j: usize) -> f64 {
