@@ -35,6 +35,8 @@ pub struct Descriptor {
     pub load: Load,
     /// What the data must have for it to be seen, or to have its unit.
     pub needs: &'static [Need],
+    /// Of a kind without a name in a diagnosis, the one that it is a case of: that name is right, and so is none.
+    pub case_of: Option<Kind>,
     /// What the diagnosis knows of it, if it has a name for it. Others are injected to see whether it says that something else is there.
     pub known: Option<Known>,
     /// Whether two of it may sit at one place: ripples of two gear stages, motion that leaks from two joints.

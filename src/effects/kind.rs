@@ -299,6 +299,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::Drives,
                 needs: &[Need::Masses],
+                case_of: None,
                 known: Some(Known {
                     hypotheses: joint_compliance::hypotheses,
                     misses: DEFLECTED,
@@ -327,6 +328,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::Drives,
                 needs: &[Need::Masses],
+                case_of: None,
                 known: Some(Known {
                     hypotheses: link_bending::hypotheses,
                     misses: DEFLECTED,
@@ -354,6 +356,7 @@ impl Kind {
                 sign_apart: true,
                 load: Load::None,
                 needs: &[Need::ApproachSides],
+                case_of: None,
                 known: Some(Known { hypotheses: backlash::hypotheses, misses: FIRST_ORDER, doubles: None, advice: &[] }),
                 may_repeat: false,
                 neighbours: &[
@@ -377,6 +380,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::Seats,
                 needs: &[Need::Masses],
+                case_of: None,
                 known: Some(Known {
                     hypotheses: gravity_lost_motion::hypotheses,
                     misses: SEATED,
@@ -404,6 +408,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::None,
                 needs: &[],
+                case_of: None,
                 known: Some(Known {
                     hypotheses: joint_eccentricity::hypotheses,
                     misses: FIRST_ORDER,
@@ -435,6 +440,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::None,
                 needs: &[],
+                case_of: None,
                 known: Some(Known { hypotheses: strain_wave_error::hypotheses, misses: FIRST_ORDER, doubles: None, advice: &[] }),
                 may_repeat: true,
                 neighbours: &[Neighbour {
@@ -461,6 +467,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::None,
                 needs: &[],
+                case_of: None,
                 known: Some(Known {
                     hypotheses: gear_coupling::hypotheses,
                     misses: FIRST_ORDER,
@@ -489,6 +496,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::None,
                 needs: &[Need::Temperatures],
+                case_of: None,
                 known: Some(Known {
                     hypotheses: link_thermal_growth::hypotheses,
                     misses: GROWN,
@@ -516,6 +524,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::None,
                 needs: &[Need::Temperatures],
+                case_of: None,
                 known: Some(Known {
                     hypotheses: joint_thermal_drift::hypotheses,
                     misses: WARMED,
@@ -543,6 +552,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::Seats,
                 needs: &[Need::Masses],
+                case_of: None,
                 known: Some(Known {
                     hypotheses: radial_clearance::hypotheses,
                     misses: SEATED_BEARING,
@@ -567,6 +577,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::Seats,
                 needs: &[Need::Masses],
+                case_of: None,
                 known: Some(Known { hypotheses: tilt_clearance::hypotheses, misses: SEATED_BEARING, doubles: None, advice: &[] }),
                 may_repeat: false,
                 neighbours: &[
@@ -589,6 +600,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::None,
                 needs: &[Need::Times],
+                case_of: None,
                 known: Some(Known {
                     hypotheses: base_drift::hypotheses,
                     misses: FIRST_ORDER,
@@ -620,6 +632,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::None,
                 needs: &[Need::Times],
+                case_of: None,
                 known: Some(Known {
                     hypotheses: base_step::hypotheses,
                     misses: FIRST_ORDER,
@@ -651,6 +664,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::Drives,
                 needs: &[Need::Masses],
+                case_of: None,
                 known: Some(Known {
                     hypotheses: base_tilt::hypotheses,
                     misses: DEFLECTED,
@@ -678,6 +692,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::None,
                 needs: &[Need::Times, Need::Orientations],
+                case_of: None,
                 known: Some(Known {
                     hypotheses: tool_step::hypotheses,
                     misses: FIRST_ORDER,
@@ -706,6 +721,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::None,
                 needs: &[],
+                case_of: None,
                 known: Some(Known { hypotheses: measurement_scale::hypotheses, misses: FIRST_ORDER, doubles: None, advice: &[] }),
                 may_repeat: false,
                 neighbours: &[Neighbour {
@@ -728,6 +744,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::None,
                 needs: &[],
+                case_of: None,
                 known: Some(Known {
                     hypotheses: joint_angle_map::hypotheses,
                     misses: STRAIGHT_BETWEEN,
@@ -755,6 +772,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::None,
                 needs: &[Need::Moves],
+                case_of: None,
                 known: Some(Known { hypotheses: creep::hypotheses, misses: FADING, doubles: None, advice: &[] }),
                 may_repeat: false,
                 neighbours: &[
@@ -777,6 +795,7 @@ impl Kind {
                 sign_apart: true,
                 load: Load::Drives,
                 needs: &[Need::ApproachSides, Need::Masses],
+                case_of: None,
                 known: Some(Known { hypotheses: direction_of_move::hypotheses, misses: DEFLECTED, doubles: None, advice: &[] }),
                 may_repeat: false,
                 neighbours: &[Neighbour { kind: Kind::Backlash, told_apart_by: PAYLOADS }],
@@ -796,6 +815,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::None,
                 needs: &[Need::Moves],
+                case_of: None,
                 known: Some(Known { hypotheses: unsettled_reading::hypotheses, misses: FADING, doubles: None, advice: &[] }),
                 may_repeat: false,
                 neighbours: &[Neighbour { kind: Kind::Creep, told_apart_by: ONE_BY_ONE }],
@@ -815,6 +835,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::None,
                 needs: &[],
+                case_of: None,
                 known: Some(Known { hypotheses: move_nothing, misses: FIRST_ORDER, doubles: None, advice: &[] }),
                 may_repeat: false,
                 neighbours: &[],
@@ -834,6 +855,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::None,
                 needs: &[],
+                case_of: Some(Kind::JointAngleMap),
                 known: None,
                 may_repeat: false,
                 neighbours: &[],
@@ -857,6 +879,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::Drives,
                 needs: &[],
+                case_of: None,
                 known: None,
                 may_repeat: false,
                 neighbours: &[],
@@ -880,6 +903,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::Drives,
                 needs: &[],
+                case_of: None,
                 known: None,
                 may_repeat: false,
                 neighbours: &[],
@@ -899,6 +923,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::None,
                 needs: &[],
+                case_of: None,
                 known: None,
                 may_repeat: false,
                 neighbours: &[],
@@ -922,6 +947,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::Drives,
                 needs: &[],
+                case_of: None,
                 known: None,
                 may_repeat: false,
                 neighbours: &[],
@@ -941,6 +967,7 @@ impl Kind {
                 sign_apart: false,
                 load: Load::Drives,
                 needs: &[],
+                case_of: None,
                 known: None,
                 may_repeat: false,
                 neighbours: &[],
@@ -1049,6 +1076,7 @@ mod tests {
                 let other = if let Advice::Beside(other, _) = advice { Some(*other) } else { None };
                 assert!(other.is_none_or(|other| of.neighbours.iter().any(|neighbour| neighbour.kind == other)), "{kind:?}");
             }
+            assert!(of.case_of.is_none_or(|named| of.known.is_none() && named.descriptor().known.is_some()), "{kind:?}");
             assert!(of.known.is_some() || of.neighbours.is_empty(), "{kind:?}: nothing is confused with what has no name");
             assert!(!of.scene.required.is_empty() || !of.scene.optional.is_empty(), "{kind:?} has no magnitude in scenes");
         }

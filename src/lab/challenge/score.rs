@@ -3,7 +3,7 @@
 //! An effect is *named* where it stands among a verdict's effects with a probability of a half or more. A case with one effect is
 //! *right* where that effect's kind is named, *wrong* where another kind is named, *abstained* where none is. What is outside the
 //! library, or withheld, is to be *flagged* (`unknown_remains`, or something unknown present); whatever kind is named there that is not
-//! in the truth is *misnamed*.
+//! in the truth is *misnamed*; a foreign effect that is a case of a known kind (worn teeth of an angle-error map) may be called so.
 //!
 //! What was withheld can be put back: [`Restored`] says what the whole library names and closes of the same cases.
 
@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::case::{CaseTruth, TrueEffect};
 use super::verdict::{Gap, NamedEffect, Place, Verdict, level};
+use crate::effects::Kind;
 use crate::statistics::{Mean, median};
 
 /// From this probability on an effect counts as named.
@@ -314,6 +315,12 @@ fn is(claim: &NamedEffect, effect: &TrueEffect) -> bool {
     claim.kind == effect.kind && at(&claim.location, effect)
 }
 
+/// Whether `claim` names `effect`, for which there is no name of its own, as the kind that it is a case of.
+fn is_case_of(claim: &NamedEffect, effect: &TrueEffect) -> bool {
+    let kind = Kind::from_name(&effect.kind).and_then(|kind| kind.descriptor().case_of);
+    kind.is_some_and(|kind| kind.name() == claim.kind) && at(&claim.location, effect)
+}
+
 /// Scores verdicts, in the order of the truths. Kinds of `withheld` count as unknown ones.
 #[must_use]
 pub fn score(truths: &[CaseTruth], verdicts: &[Verdict], withheld: &[String]) -> Score {
@@ -432,10 +439,12 @@ impl Mixed {
         self.visible_effects += known().filter(visible).count();
         self.visible_found += known().filter(visible).filter(|effect| named.iter().any(|claim| is(claim, effect))).count();
         self.named += named.len();
-        self.named_right += named.iter().filter(|claim| known().any(|effect| is(claim, effect))).count();
+        let case = |claim: &NamedEffect| truth.effects.iter().any(|effect| foreign(effect) && is_case_of(claim, effect));
+        let right = |claim: &&&NamedEffect| known().any(|effect| is(claim, effect)) || case(claim);
+        self.named_right += named.iter().filter(right).count();
         if truth.effects.iter().filter(|effect| foreign(effect)).any(|effect| visible(&effect)) {
             self.visible_outside += 1;
-            self.flagged += usize::from(flagged(verdict));
+            self.flagged += usize::from(flagged(verdict) || named.iter().any(|claim| case(claim)));
         }
     }
 }
@@ -495,10 +504,11 @@ fn of_foreign(truths: &[CaseTruth], verdicts: &[Verdict], foreign: &dyn Fn(&True
         };
         let row = usize::from(effect.lambda.is_some_and(|lambda| lambda >= FLAGGED_FROM));
         let there = |kind: &str| truth.effects.iter().any(|effect| !foreign(effect) && effect.kind == kind);
-        let misnamed = named(verdict).iter().any(|claim| !there(&claim.kind));
+        let right = |claim: &&NamedEffect| truth.effects.iter().any(|effect| foreign(effect) && is_case_of(claim, effect));
+        let misnamed = named(verdict).iter().any(|claim| !there(&claim.kind) && !right(&claim));
         for row in [row, 2] {
             rows[row].cases += 1;
-            rows[row].flagged += usize::from(flagged(verdict));
+            rows[row].flagged += usize::from(flagged(verdict) || named(verdict).iter().any(|claim| right(&claim)));
             rows[row].misnamed += usize::from(misnamed);
         }
     }
@@ -512,8 +522,14 @@ fn calibration(truths: &[CaseTruth], verdicts: &[Verdict], foreign: &dyn Fn(&Tru
         let holds = |kind: &str, place: Option<&Place>| {
             let outliers = tails && kind == "measurement_outliers";
             let unknown = kind == "unknown" && truth.effects.iter().any(foreign);
-            let there =
-                |effect: &TrueEffect| effect.kind == kind && !foreign(effect) && place.is_some_and(|place| at(place, effect));
+            let there = |effect: &TrueEffect| {
+                let named = if foreign(effect) {
+                    Kind::from_name(&effect.kind).and_then(|kind| kind.descriptor().case_of).is_some_and(|of| of.name() == kind)
+                } else {
+                    effect.kind == kind
+                };
+                named && place.is_some_and(|place| at(place, effect))
+            };
             outliers || unknown || truth.effects.iter().any(there)
         };
         for effect in &verdict.effects {
@@ -748,6 +764,7 @@ fn confusion(truths: &[CaseTruth], verdicts: &[Verdict]) -> Vec<Confusion> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::Kind;
     use crate::effects::{Level, Location};
     use crate::lab::challenge::case::{Tails, TrueNoise};
     use crate::lab::challenge::verdict::{Candidate, Magnitude, nothing_at_all, oracle};
