@@ -266,16 +266,16 @@ impl Validation<'_> {
         let mut candidates = linear.candidates.clone();
         let found = candidates.scanned..candidates.active.len();
         let were_active = candidates.active[found.clone()].to_vec();
-        candidates.active[found.clone()].fill(false);
+        // A closer look at when something happens looks nowhere else.
+        for number in found.clone() {
+            candidates.active[number] &= strongest(&candidates.hypotheses[number].shape).is_none();
+        }
         let mut members = Vec::new();
         while found.clone().any(|number| were_active[number - found.start] && !candidates.active[number]) {
             let evidence = Evidence { marginal, candidates: &candidates, noise: self.noise, settings: self.settings };
             members = climb(&evidence, &members, self.settings.search.most).0;
-            let coefficients = evidence.coefficients(&members);
-            let residual = linear.left(&marginal.geometry(&coefficients), &linear.made(&coefficients));
-            let level = evidence.noise_level(&members);
             let of_rows = Linear { candidates: &candidates, ..linear.clone() };
-            let again = ripple::scan(&of_rows, &residual, level, &counts, &self.settings.ripple);
+            let again = ripple::look(&of_rows, &evidence, &members, &counts);
             let is_again = |number: &usize| {
                 let (joint, order) = strongest(&candidates.hypotheses[*number].shape).unwrap_or_default();
                 let same = |one: &Ripple| one.joint == joint && f64::from(one.waves) == order;

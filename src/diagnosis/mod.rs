@@ -53,7 +53,7 @@ pub use rows::{DiagnosisError, check_robot};
 use nalgebra::{DVector, Vector3};
 
 use crate::arm::Arm;
-use crate::effects::signature::library::{Hypothesis, library, ripple};
+use crate::effects::signature::library::{Hypothesis, library, ripple, strongest};
 use crate::effects::signature::shape::Displacement;
 use crate::effects::{Kind, Location};
 use crate::identification::geometry::GeometryError;
@@ -104,12 +104,10 @@ impl Options {
     }
 
     /// What is looked for.
-    fn candidates(&self, rows: &Rows, conditions: &Conditions, ripples: &[Ripple]) -> Candidates {
+    fn candidates(&self, rows: &Rows, conditions: &Conditions, scanned: &[Hypothesis]) -> Candidates {
         let wanted = |hypothesis: &Hypothesis| self.wants(hypothesis.kind, hypothesis.location);
-        let nameless = self.without.contains(&Kind::StrainWaveError);
-        let scanned = ripples.iter().flat_map(|found| ripple(found.joint, found.waves, nameless));
         let library = library(&rows.mechanism, &conditions.columns).into_iter();
-        candidates(library.filter(wanted).collect(), scanned.filter(wanted).collect())
+        candidates(library.filter(wanted).collect(), scanned.iter().filter(|one| wanted(one)).cloned().collect())
     }
 }
 
@@ -153,8 +151,8 @@ struct State {
     present: Vec<Present>,
     /// The best set so far.
     members: Vec<(usize, usize)>,
-    /// Ripples that scans have added to the library.
-    ripples: Vec<Ripple>,
+    /// What scans, and a closer look at what was found, have added to the library.
+    scanned: Vec<Hypothesis>,
     /// Joints that do not repeat.
     scatter: Vec<Scatter>,
     /// Noise of the orientations over what is said of it, beside that of the positions.
@@ -182,7 +180,7 @@ impl State {
             coefficients: Vec::new(),
             present: Vec::new(),
             members: Vec::new(),
-            ripples: Vec::new(),
+            scanned: Vec::new(),
             scatter: Vec::new(),
             orientation: data.orientation.unwrap_or(1.0),
             scale: 1.0,
@@ -345,7 +343,7 @@ impl Pass {
         let rows = rows::fit(data.arm, readings)?;
         let (conditions, displaced) =
             conditions::conditions(measurements, &rows, &state.present, state.loads, state.upright.as_deref(), &settings.model);
-        let mut candidates = data.options.candidates(&rows, &conditions, &state.ripples);
+        let mut candidates = data.options.candidates(&rows, &conditions, &state.scanned);
         let scheme = held_out::schemes(measurements, &rows.targets, &data.groups, &settings.validation).swap_remove(0);
         let linear = around(state, &rows, &conditions, &displaced, &candidates);
         let products = linear.products(&scheme.fold, scheme.folds);
@@ -612,13 +610,19 @@ fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
             let known = state.orientation != 1.0;
             let ratio =
                 weights::orientation_over_position(&pass.rows, &pass.residual, known, &settings.noise).filter(|_| may_tell);
-            let mut more =
-                ripple::scan(&linear, &pass.residual, evidence.noise_level(&pass.members), &|_| true, &settings.ripple);
+            let mut more = closer(&pass, &state.scanned);
             // Those that are not looked for stay out of the library, and come again.
-            more.retain(|found| !state.ripples.iter().any(|known| (known.joint, known.waves) == (found.joint, found.waves)));
+            let known = |found: &&Ripple| {
+                state.scanned.iter().any(|known| strongest(&known.shape) == Some((found.joint, f64::from(found.waves))))
+            };
+            let nameless = data.options.without.contains(&Kind::StrainWaveError);
+            let ripples = ripple::look(&linear, &evidence, &pass.members, &|_| true);
+            more.extend(
+                ripples.iter().filter(|found| !known(found)).flat_map(|found| ripple(found.joint, found.waves, nameless)),
+            );
             if !state.is_settled(&pass, sigma_m, &settings.model) || !more.is_empty() || ratio.is_some() {
                 state = state.after(&pass);
-                state.ripples.extend(more);
+                state.scanned.extend(more);
                 state.orientation *= ratio.unwrap_or(1.0);
                 continue;
             }
@@ -664,6 +668,22 @@ fn settle(data: &Data<'_>) -> Result<(State, Pass), DiagnosisError> {
         return Ok((state, pass));
     }
     unreachable!("the loop ends by returning")
+}
+
+/// What lies between the members of the likeliest set and their neighbours in the library, but for what is `known`: times at which
+/// something happens, and over which it fades.
+fn closer(pass: &Pass, known: &[Hypothesis]) -> Vec<Hypothesis> {
+    let mut found: Vec<Hypothesis> = Vec::new();
+    for (member, _) in &pass.members {
+        let of = &pass.candidates.hypotheses[*member];
+        for (shape, detail) in of.shape.closer(&pass.conditions.columns) {
+            let same = |one: &Hypothesis| one.shape == shape;
+            if !known.iter().chain(&found).chain(&pass.candidates.hypotheses).any(same) {
+                found.push(Hypothesis { shape, detail, ..of.clone() });
+            }
+        }
+    }
+    found
 }
 
 /// Readings that are far off beside what was found.

@@ -3,10 +3,11 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
+use super::evidence::Evidence;
 use super::linear::Linear;
 use super::settings;
 use crate::effects::kind::joint_eccentricity::Harmonic;
-use crate::effects::signature::library::RIPPLES;
+use crate::effects::signature::library::{RIPPLES, strongest};
 use crate::effects::signature::shape::Shape;
 use crate::numerics::gram;
 
@@ -68,9 +69,36 @@ pub(super) fn finest(angles: impl Iterator<Item = f64>) -> u16 {
     limit.min(f64::from(*RIPPLES.end())) as u16
 }
 
+/// The strongest ripples in what geometry and `members` leave of the rows that `counts`: beside the ripples among the members, and in
+/// their place, for two that are in play already may stand for one that is not.
+pub(super) fn look(
+    linear: &Linear<'_>,
+    evidence: &Evidence<'_>,
+    members: &[(usize, usize)],
+    counts: &(dyn Fn(usize) -> bool + Sync),
+) -> Vec<Ripple> {
+    let coefficients = evidence.coefficients(members);
+    let residual = linear.left(&evidence.marginal.geometry(&coefficients), &linear.made(&coefficients));
+    let (level, settings) = (evidence.noise_level(members), &evidence.settings.ripple);
+    let mut found = scan(linear, &residual, level, counts, settings);
+    let is_ripple = |member: usize| {
+        strongest(&evidence.candidates.hypotheses[member].shape).is_some_and(|(_, order)| order >= f64::from(*RIPPLES.start()))
+    };
+    let columns: Vec<_> =
+        members.iter().filter(|(member, _)| is_ripple(*member)).map(|(member, _)| evidence.candidates.columns(*member)).collect();
+    if !columns.is_empty() {
+        let of_ripples: Vec<(usize, f64)> =
+            coefficients.into_iter().filter(|(column, _)| columns.iter().any(|columns| columns.contains(column))).collect();
+        let put_back = residual + linear.made(&of_ripples);
+        found.extend(scan(linear, &put_back, level, counts, settings));
+        found.dedup_by_key(|one| (one.joint, one.waves));
+    }
+    found
+}
+
 /// The strongest ripple of each joint in `residual` (m, rad), whose noise has the mean square `level` in declared sigmas; the strongest
 /// first, none that is weak or a candidate in play already. `counts`: rows that are looked at.
-pub(super) fn scan(
+fn scan(
     linear: &Linear<'_>,
     residual: &DVector<f64>,
     level: f64,

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::effects::signature::library::{Hypothesis, Site, twist_spread};
+use crate::effects::signature::library::{Columns, Hypothesis, Site, twist_spread};
 use crate::effects::signature::shape::{Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, Size};
 use crate::effects::{Kind, Parameters, Values};
 
@@ -29,6 +29,10 @@ impl Follows for BaseStep {
 impl Named for BaseStep {
     fn undecided(&self, _: &Reading) -> bool {
         false
+    }
+
+    fn closer(&self, columns: &Columns) -> Vec<(Shape, String)> {
+        columns.rows_about(self.row).into_iter().map(|row| (Shape::BaseStep(BaseStep { row }), String::new())).collect()
     }
 
     fn parameters(&self, of: Coefficients<'_>) -> Parameters {

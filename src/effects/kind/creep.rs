@@ -5,7 +5,7 @@ use std::num::NonZeroUsize;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::effects::signature::library::{Hypothesis, Site};
+use crate::effects::signature::library::{Columns, Hypothesis, Site};
 use crate::effects::signature::shape::{
     Coefficients, Displacement, FADING_S, Follows, Form, Named, Reading, Recorded, Shape, Size, from_one,
 };
@@ -19,21 +19,17 @@ pub struct Behind {
     #[serde(with = "from_one")]
     #[schemars(with = "NonZeroUsize")]
     pub joint: usize,
-    /// Which time it takes to fade, from 0: at once (only the last move counts), then longer and longer.
-    pub which: usize,
+    /// Time over which it fades, s; zero: it is gone by the next reading.
+    pub fading_s: f64,
 }
 
-impl Behind {
-    /// Time over which it fades, s.
-    fn fading_s(&self) -> f64 {
-        FADING_S.get(self.which).copied().unwrap_or(0.0)
-    }
-}
+/// Steps of the time from one in the library to the next.
+const CLOSER: i32 = 4;
 
 impl Follows for Behind {
     fn form(&self, _: bool) -> Form {
         Form {
-            columns: if self.which == 0 { 1 } else { 2 },
+            columns: if self.fading_s == 0.0 { 1 } else { 2 },
             of_magnitude: 1,
             size: Size::Length,
             needs: Recorded::Moves,
@@ -42,11 +38,17 @@ impl Follows for Behind {
     }
 
     fn columns(&self, reading: &Reading, _: bool) -> Vec<Displacement> {
-        let own = reading.moved(self.joint, -reading.behind[self.joint][self.which.min(FADING_S.len() - 1)]);
-        if self.which == 0 {
-            return vec![own];
+        let behind = &reading.behind[self.joint];
+        if self.fading_s == 0.0 {
+            return vec![reading.moved(self.joint, -behind[0])];
         }
-        vec![own, reading.moved(self.joint, -libm::exp(-reading.since_begin_s / self.fading_s()))]
+        // Between the times that are known, in proportion to their logarithms.
+        let next = FADING_S.partition_point(|known| *known < self.fading_s).clamp(2, FADING_S.len() - 1);
+        let [from, to] = [FADING_S[next - 1], FADING_S[next]];
+        let share = (libm::log(self.fading_s / from) / libm::log(to / from)).clamp(0.0, 1.0);
+        let left = behind[next - 1] * (1.0 - share) + behind[next] * share;
+        let before = libm::exp(-reading.since_begin_s / self.fading_s);
+        vec![reading.moved(self.joint, -left), reading.moved(self.joint, -before)]
     }
 }
 
@@ -55,12 +57,22 @@ impl Named for Behind {
         reading.since_begin_s == 0.0
     }
 
+    fn closer(&self, _: &Columns) -> Vec<(Shape, String)> {
+        let of = |step: i32| {
+            let fading_s = self.fading_s * libm::exp2(0.5 * f64::from(step) / f64::from(CLOSER));
+            (Shape::Behind(Behind { fading_s, ..*self }), words(fading_s))
+        };
+        // What a closer look has found needs none.
+        let steps = if FADING_S[1..].contains(&self.fading_s) { 1 - CLOSER..CLOSER } else { 0..0 };
+        steps.filter(|step| *step != 0).map(of).collect()
+    }
+
     fn parameters(&self, _: Coefficients<'_>) -> Parameters {
-        Parameters { time_constant_s: Some(self.fading_s()), ..Parameters::default() }
+        Parameters { time_constant_s: Some(self.fading_s), ..Parameters::default() }
     }
 
     fn values(&self, of: Coefficients<'_>) -> Result<Vec<Values>, String> {
-        Ok(vec![Values { lag: of.at(0)?, time_constant: self.fading_s(), ..Values::default() }])
+        Ok(vec![Values { lag: of.at(0)?, time_constant: self.fading_s, ..Values::default() }])
     }
 }
 
@@ -68,9 +80,13 @@ pub(in crate::effects) fn hypotheses(site: &Site<'_>, all: &mut Vec<Hypothesis>)
     let Some(joint) = site.place.filter(|_| site.columns.moves) else {
         return;
     };
-    for (which, time) in FADING_S.iter().enumerate() {
-        let detail = if which == 0 { "gone by the next reading".to_owned() } else { format!("fading over about {time:.0} s") };
-        let spread = vec![1.0; if which == 0 { 1 } else { 2 }];
-        all.push(Hypothesis { detail, spread, ..site.hypothesis(Kind::Creep, Shape::Behind(Behind { joint, which })) });
+    for fading_s in FADING_S {
+        let spread = vec![1.0; if fading_s == 0.0 { 1 } else { 2 }];
+        let of = site.hypothesis(Kind::Creep, Shape::Behind(Behind { joint, fading_s }));
+        all.push(Hypothesis { detail: words(fading_s), spread, ..of });
     }
+}
+
+fn words(fading_s: f64) -> String {
+    if fading_s == 0.0 { "gone by the next reading".to_owned() } else { format!("fading over about {fading_s:.0} s") }
 }

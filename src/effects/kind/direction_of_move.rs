@@ -32,8 +32,9 @@ impl Follows for DirectionLoad {
 }
 
 impl Named for DirectionLoad {
-    fn undecided(&self, _: &Reading) -> bool {
-        false
+    fn undecided(&self, reading: &Reading) -> bool {
+        // Nobody knows from where the arm came.
+        reading.approach.get(self.joint) == Some(&0.0)
     }
 
     fn parameters(&self, of: Coefficients<'_>) -> Parameters {

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::effects::signature::library::{Hypothesis, Site, twist_spread};
+use crate::effects::signature::library::{Columns, Hypothesis, Site, twist_spread};
 use crate::effects::signature::shape::{Coefficients, Displacement, Follows, Form, Named, Reading, Recorded, Shape, Size};
 use crate::effects::{Kind, Parameters, Values};
 
@@ -35,6 +35,10 @@ impl Follows for ToolStep {
 impl Named for ToolStep {
     fn undecided(&self, _: &Reading) -> bool {
         false
+    }
+
+    fn closer(&self, columns: &Columns) -> Vec<(Shape, String)> {
+        columns.rows_about(self.row).into_iter().map(|row| (Shape::ToolStep(ToolStep { row }), String::new())).collect()
     }
 
     fn parameters(&self, of: Coefficients<'_>) -> Parameters {

@@ -52,6 +52,20 @@ pub struct Columns {
     pub changes: Vec<usize>,
 }
 
+impl Columns {
+    /// Places in time strictly between `row` and the candidates for a change on either side of it.
+    pub(in crate::effects) fn rows_about(&self, row: usize) -> Vec<usize> {
+        let before = self.changes.iter().rev().find(|known| **known < row);
+        let after = self.changes.iter().find(|known| **known > row);
+        match (before, after) {
+            (Some(before), Some(after)) => (before + 1..*after).filter(|near| *near != row).collect(),
+            (None, Some(after)) => (row + 1..*after).collect(),
+            (Some(before), None) => (before + 1..row).collect(),
+            (None, None) => Vec::new(),
+        }
+    }
+}
+
 /// A place of an arm at which effects may sit, and what the data have.
 pub struct Site<'a> {
     /// Joint, or the link that it moves, from 0; `None` for the whole arm and for what has no number.

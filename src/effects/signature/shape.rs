@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::library::Columns;
 use super::posture::Posture;
 pub use super::unnamed::angle_map::MAP_ORDERS;
 pub use super::unnamed::memory::MEMORIES;
@@ -32,6 +33,11 @@ pub(in crate::effects) trait Named: Follows {
     /// Whether nobody knows to which side this is seated at `reading`: the load is next to nothing, and friction or a base that is not
     /// level may decide. False where nothing is seated.
     fn undecided(&self, reading: &Reading) -> bool;
+
+    /// Others that lie between this one and its neighbours in the library, with what is said of them in words.
+    fn closer(&self, _: &Columns) -> Vec<(Shape, String)> {
+        Vec::new()
+    }
 
     /// What a diagnosis says of it besides kind, place and magnitude.
     fn parameters(&self, of: Coefficients<'_>) -> Parameters;
@@ -225,7 +231,7 @@ impl Course {
     }
 }
 
-/// Times over which what is left of a move fades, s; zero: it is gone by the next reading. Between two neighbours lie 5 % of what it does.
+/// Times over which what is left of a move fades, s; zero: it is gone by the next reading.
 pub const FADING_S: [f64; 13] = [0.0, 5.0, 7.0, 10.0, 14.0, 20.0, 28.0, 40.0, 56.0, 80.0, 112.0, 160.0, 225.0];
 
 /// A row of measurements as signatures see it.
@@ -390,6 +396,12 @@ impl Shape {
         // Nothing follows from a diagnosis that does not say how much of it there is.
         of.at(0)?;
         self.named().map_or_else(|| Err("a shape without a name".to_owned()), |named| named.values(of))
+    }
+
+    /// Others that lie between this one and its neighbours in the library that is made of `columns`, with what is said of them in words.
+    #[must_use]
+    pub fn closer(&self, columns: &Columns) -> Vec<(Shape, String)> {
+        self.named().map_or_else(Vec::new, |named| named.closer(columns))
     }
 
     fn follows(&self) -> &dyn Follows {
