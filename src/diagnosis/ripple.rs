@@ -7,7 +7,7 @@ use super::evidence::Evidence;
 use super::linear::Linear;
 use super::settings;
 use crate::effects::kind::joint_eccentricity::Harmonic;
-use crate::effects::signature::library::{RIPPLES, strongest};
+use crate::effects::signature::library::RIPPLES;
 use crate::effects::signature::shape::Shape;
 use crate::numerics::gram;
 
@@ -69,8 +69,8 @@ pub(super) fn finest(angles: impl Iterator<Item = f64>) -> u16 {
     limit.min(f64::from(*RIPPLES.end())) as u16
 }
 
-/// The strongest ripples in what geometry and `members` leave of the rows that `counts`: beside the ripples among the members, and in
-/// their place, for two that are in play already may stand for one that is not.
+/// The strongest ripples in what geometry and `members` leave of the rows that `counts`: beside those members that follow a joint's angle,
+/// and in their place, for a map, or ripples that are in play already, may stand for one that is not.
 pub(super) fn look(
     linear: &Linear<'_>,
     evidence: &Evidence<'_>,
@@ -81,15 +81,13 @@ pub(super) fn look(
     let residual = linear.left(&evidence.marginal.geometry(&coefficients), &linear.made(&coefficients));
     let (level, settings) = (evidence.noise_level(members), &evidence.settings.ripple);
     let mut found = scan(linear, &residual, level, counts, settings);
-    let is_ripple = |member: usize| {
-        strongest(&evidence.candidates.hypotheses[member].shape).is_some_and(|(_, order)| order >= f64::from(*RIPPLES.start()))
-    };
-    let columns: Vec<_> =
-        members.iter().filter(|(member, _)| is_ripple(*member)).map(|(member, _)| evidence.candidates.columns(*member)).collect();
+    let follows_angle = |member: usize| evidence.candidates.hypotheses[member].shape.of_angle().is_some();
+    let of_angles = members.iter().filter(|(member, _)| follows_angle(*member));
+    let columns: Vec<_> = of_angles.map(|(member, _)| evidence.candidates.columns(*member)).collect();
     if !columns.is_empty() {
-        let of_ripples: Vec<(usize, f64)> =
+        let of_angles: Vec<(usize, f64)> =
             coefficients.into_iter().filter(|(column, _)| columns.iter().any(|columns| columns.contains(column))).collect();
-        let put_back = residual + linear.made(&of_ripples);
+        let put_back = residual + linear.made(&of_angles);
         found.extend(scan(linear, &put_back, level, counts, settings));
         found.dedup_by_key(|one| (one.joint, one.waves));
     }

@@ -38,7 +38,7 @@ const MADE_SINCE: [(Topic, [u64; 3]); 4] = [
     (Topic::Identification, [0, 2, 0]),
     (Topic::ResidualsAfter, [0, 2, 0]),
     (Topic::PosesPredicted, [0, 2, 0]),
-    (Topic::Diagnosis, [0, 4, 0]),
+    (Topic::Diagnosis, [0, 5, 0]),
 ];
 
 /// Whether `version` makes `topic` by another method than this one.

@@ -260,3 +260,39 @@ fn the_geometry_is_the_one_that_identify_fits() {
         }
     }
 }
+
+/// Tables by other people's kinematics and formulas (`tests/python/foreign_tables.py`): each cause is named, where it is, as large as it is.
+#[test]
+fn causes_in_tables_by_pinocchio_are_named() {
+    let of = |kind: &str, index: u64, magnitude: f64| (kind.to_owned(), (index > 0).then_some(index), magnitude);
+    let root_of_lines = 5e-4 * (2.0_f64 / 3.0).sqrt();
+    let tables = [
+        // Straight between lines of 0.5 mrad: two thirds of their variance.
+        ("map_joint_3", of("joint_angle_map", 3, root_of_lines), 0.3),
+        ("gear_joint_2_once_twice_four_times", of("strain_wave_error", 2, 1.5e-4), 0.1),
+        ("gear_joint_4_once", of("strain_wave_error", 4, 1.5e-4), 0.1),
+        ("coupling_joint_7_of_joint_5", of("gear_coupling", 7, 3e-4), 0.1),
+        ("unsettled", of("unsettled_reading", 0, 6e-4), 0.1),
+        ("creep_joint_2", of("creep", 2, 7e-4), 0.1),
+        ("wound_up_joint_2", of("direction_of_move", 2, 2e-5), 0.1),
+        ("base_away_for_25_rows", of("base_step", 0, 3.74e-4), 0.3),
+        ("tool_knocked_at_row_6", of("tool_step", 0, 5.1e-4), 0.2),
+        ("yields_joint_2_on_a_wall", of("joint_compliance", 2, 4e-5), 0.1),
+    ];
+    for (name, (kind, index, magnitude), within) in tables {
+        let out = tempfile::tempdir().unwrap();
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+        let table = root.join(format!("tests/reference/pinocchio/{name}.csv"));
+        let robot = root.join("scenes/panda.urdf");
+        let [table, robot] = [&table, &robot].map(|path| path.to_str().unwrap());
+        let json =
+            kincal(out.path(), &["diagnose", table, "--robot", robot, "--position-noise-um", "20", "--json"]).ends(0).json();
+        let effects = json["effects"].as_array().unwrap();
+        assert!(!effects.is_empty(), "{name}: nothing is named");
+        for effect in effects {
+            assert_eq!((effect["kind"].as_str(), effect["location"]["index"].as_u64()), (Some(kind.as_str()), index), "{name}");
+            let found = effect["magnitude"]["value"].as_f64().unwrap().abs();
+            assert!((found / magnitude - 1.0).abs() < within, "{name}: {found} against {magnitude}");
+        }
+    }
+}
