@@ -92,10 +92,10 @@ impl Candidates {
     }
 }
 
-/// Whether physics allows only one sign.
+/// Whether physics allows only one sign: of what has one coefficient.
 #[must_use]
 pub(crate) fn one_signed(hypothesis: &Hypothesis) -> bool {
-    hypothesis.kind.is_some_and(|kind| kind.descriptor().one_signed)
+    hypothesis.spread.len() == 1 && hypothesis.kind.is_some_and(|kind| kind.descriptor().one_signed)
 }
 
 /// Members fitted together.
@@ -347,20 +347,20 @@ mod tests {
         assert!((log_allowed(-6.0 - 1e-9) - log_allowed(-6.0 + 1e-9)).abs() < 0.03);
     }
 
-    /// No kind of the table is one-signed with several coefficients; one that were would be held to the sign of the first.
+    /// A compliance is positive; one of several coefficients, of which each may point anywhere, has no sign.
     #[test]
-    fn one_sign_holds_for_the_first_of_several_coefficients_too() {
-        let of = Hypothesis {
+    fn one_sign_holds_for_one_coefficient() {
+        let of = |columns: usize| Hypothesis {
             share: None,
             kind: Some(Kind::JointCompliance),
             location: Location { level: Level::Joint, index: Some(1) },
             shape: Shape::Torque(Torque { joint: 0 }),
             range: [0.5, 2.0],
-            spread: vec![1.0; 2],
+            spread: vec![1.0; columns],
             detail: String::new(),
         };
-        let candidates = Candidates {
-            hypotheses: vec![of],
+        let candidates = |columns: usize| Candidates {
+            hypotheses: vec![of(columns)],
             first: vec![0],
             unit: vec![1.0],
             widest: vec![f64::INFINITY],
@@ -370,9 +370,10 @@ mod tests {
         };
         let (noise, settings) = (NoisePrior { degrees_of_freedom: 10.0, level: 1.0 }, Settings::default());
         let mut draws = stream(4, "test/one-signed");
-        let signatures = DMatrix::from_fn(80, 2, |_, _| draws.normal());
+        let both = DMatrix::from_fn(80, 2, |_, _| draws.normal());
         let errors = DVector::from_fn(80, |_, _| draws.normal());
-        let value = |sign: f64| {
+        let value = |columns: usize, sign: f64| {
+            let (candidates, signatures) = (candidates(columns), both.columns(0, columns).into_owned());
             let residual = &errors + signatures.column(0) * sign;
             let products = test_marginal(&candidates, &signatures, &residual);
             let marginal = products.marginal();
@@ -385,7 +386,8 @@ mod tests {
             }
             found[0].log_posterior
         };
-        assert!(value(1.0) > value(-1.0) + 10.0);
+        assert!(value(1, 1.0) > value(1, -1.0) + 10.0);
+        assert!((value(2, 1.0) - value(2, -1.0)).abs() < 10.0);
     }
 
     /// Two columns that are nearly the same, one large against the other; and a third that has nothing to do with them.

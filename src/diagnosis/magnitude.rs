@@ -1,5 +1,7 @@
 //! How large a named effect is, with its interval.
 
+use nalgebra::{DMatrix, DVector};
+
 use super::Analysis;
 use super::evidence::Fit;
 use super::outcome::Magnitude;
@@ -28,11 +30,8 @@ pub(super) fn magnitude(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -
     let columns = analysis.evidence.candidates.columns(hypothesis);
     let width = of.shape.magnitude_width();
     let at: Vec<usize> = columns.take(width).filter_map(|column| fit.columns.iter().position(|known| *known == column)).collect();
-    let counts = counts(analysis, hypothesis);
-    let value = |i: usize| fit.coefficients[at[i]] * unit * of.spread[i] * counts[i];
-    let covariance = |i: usize, j: usize| {
-        fit.noise * fit.covariance[(at[i], at[j])] * unit * unit * of.spread[i] * of.spread[j] * counts[i] * counts[j]
-    };
+    let value = |i: usize| fit.coefficients[at[i]] * unit * of.spread[i];
+    let covariance = |i: usize, j: usize| fit.noise * fit.covariance[(at[i], at[j])] * unit * unit * of.spread[i] * of.spread[j];
     let degrees_of_freedom =
         (analysis.evidence.marginal.degrees_of_freedom + analysis.evidence.noise.degrees_of_freedom).max(1.0);
     let quantile = student_quantile(0.975, degrees_of_freedom).unwrap_or(NORMAL_95);
@@ -48,28 +47,30 @@ pub(super) fn magnitude(analysis: &Analysis<'_>, fit: &Fit, hypothesis: usize) -
         let interval = if flip { [-interval[1], -interval[0]] } else { interval };
         return Magnitude { value: if flip { -mean } else { mean }, unit: name, ci95: interval };
     }
-    let length = libm::sqrt((0..width).map(|i| value(i) * value(i)).sum::<f64>());
-    let mut along = 0.0;
-    let mut trace = 0.0;
-    for i in 0..width {
-        trace += covariance(i, i);
-        for j in 0..width {
-            along += value(i) * value(j) * covariance(i, j) / (length * length).max(1e-300);
-        }
-    }
+    let metric = metric(analysis, hypothesis);
+    let values = DVector::from_fn(width, |i, _| value(i));
+    let weighed = &metric * &values;
+    let length = libm::sqrt(values.dot(&weighed).max(0.0));
+    let covariance = DMatrix::from_fn(width, width, covariance);
+    let along = weighed.dot(&(&covariance * &weighed)) / (length * length).max(1e-300);
+    let trace = metric.component_mul(&covariance).sum();
     // The length of a noisy vector is too long by what is across it.
     let true_length = libm::sqrt((length * length - (trace - along)).max(settings.shortened * length * length));
     let half = quantile * libm::hypot(libm::sqrt(along), model * length);
     Magnitude { value: true_length, unit: name, ci95: [(true_length - half).max(0.0), true_length + half] }
 }
 
-/// How much each coefficient of `hypothesis` counts in the length that is its magnitude: of a free function, as the readings tell of it.
-fn counts(analysis: &Analysis<'_>, hypothesis: usize) -> Vec<f64> {
+/// What makes a square of a magnitude from coefficients of `hypothesis`: of a free function, what the readings see of it.
+fn metric(analysis: &Analysis<'_>, hypothesis: usize) -> DMatrix<f64> {
     let shape = &analysis.evidence.candidates.hypotheses[hypothesis].shape;
     let width = shape.magnitude_width();
     match shape.size() {
-        Size::Length => vec![1.0; width],
-        Size::Rms => analysis.evidence.marginal.shares(hypothesis).into_iter().map(libm::sqrt).collect(),
+        Size::Length => DMatrix::identity(width, width),
+        Size::Rms => {
+            let marginal = analysis.evidence.marginal;
+            let all = marginal.information(hypothesis).max(1e-300);
+            DMatrix::from_fn(width, width, |i, j| marginal.own(hypothesis, i, j) / all)
+        }
     }
 }
 
@@ -85,8 +86,6 @@ fn is_driven_by_load(kind: Option<Kind>) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{DMatrix, DVector};
-
     use super::*;
     use crate::diagnosis::tests::{hypothesis, with_analysis};
     use crate::effects::signature::shape::Shape;

@@ -2,13 +2,14 @@
 
 use super::Analysis;
 use super::advice::next;
-use super::conclusion::Conclusion;
+use super::claims::claim;
+use super::conclusion::{Conclusion, Remains};
 use super::confusion::confusion;
 use super::detectability::detectability;
 use super::gap::Closing;
 use super::naming::name;
 use super::notes::notes;
-use super::outcome::{Candidate, Effect, NoiseFloor, NoiseSource, Residual, Verdict};
+use super::outcome::{Candidate, Effect, Gap, NoiseFloor, NoiseSource, Residual, Verdict};
 use super::settings::Decision;
 use super::unknown::unknown;
 use crate::effects::Kind;
@@ -20,9 +21,13 @@ pub(super) fn conclude(analysis: &Analysis<'_>) -> Conclusion {
     let level = analysis.evidence.noise_level(&analysis.found.best);
     let closing = Closing::new(analysis, noise_floor.position_m);
     let gap = closing.gap();
-    let unknown = unknown(analysis, level, &noise_floor);
+    let mut unknown = unknown(analysis, level, &noise_floor);
     let named = name(analysis, &closing, unknown.present);
     let confusion_sets = confusion(analysis);
+    if named.effects.is_empty() && confusion_sets.is_empty() && !unknown.present {
+        unknown.remains = unsaid(analysis, &gap);
+        unknown.present = !unknown.remains.is_empty();
+    }
     let power = detectability(analysis, level);
     let notes = notes(analysis, level, &noise_floor, &gap);
     let verdict = decide(unknown.present, &named.effects, &confusion_sets, power.share, settings);
@@ -44,6 +49,21 @@ pub(super) fn conclude(analysis: &Analysis<'_>) -> Conclusion {
         detectable: power.detectable,
         detectable_share: power.share,
     }
+}
+
+/// What is there of causes that have a name, and cannot be named: their size may be nothing, though something is.
+fn unsaid(analysis: &Analysis<'_>, gap: &Gap) -> Vec<Remains> {
+    let there =
+        |hypothesis: usize| analysis.found.probability(claim(analysis, hypothesis)) >= analysis.options.settings.decision.there;
+    let mut members = analysis.found.best.iter().map(|(hypothesis, _)| *hypothesis).filter(|hypothesis| there(*hypothesis));
+    let Some(first) = members.next() else {
+        return Vec::new();
+    };
+    let of = &analysis.evidence.candidates.hypotheses[first];
+    let kind = of.kind.map_or("a shape without a name", Kind::name).replace('_', " ");
+    let moved = gap.geometry_rms_m * gap.geometry_rms_m - gap.explained_rms_m * gap.explained_rms_m;
+    let (detail, besides) = (format!("{kind} of {}, of a size that cannot be told", of.location), members.count());
+    vec![Remains::Shape { detail, besides, rms_m: libm::sqrt(moved.max(0.0)) }]
 }
 
 /// The noise of the sensor: from repeats where there are enough, else as is said and as few repeats change it.

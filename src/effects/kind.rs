@@ -105,6 +105,7 @@ pub enum Kind {
 #[expect(missing_docs, reason = "each is described in its file")]
 pub enum Shape {
     Torque(joint_compliance::Torque),
+    FreeLoad(joint_compliance::FreeLoad),
     MomentAcross(link_bending::MomentAcross),
     Beam(link_bending::Beam),
     Direction(backlash::Direction),
@@ -146,6 +147,7 @@ impl Shape {
     pub(super) fn answers(&self) -> Answers<'_> {
         Answers::Named(match self {
             Shape::Torque(of) => of,
+            Shape::FreeLoad(of) => of,
             Shape::MomentAcross(of) => of,
             Shape::Beam(of) => of,
             Shape::Direction(of) => of,
@@ -1110,8 +1112,8 @@ mod tests {
         let schema = schemars::schema_for!(Shape);
         let shapes = schema.get("oneOf").and_then(Value::as_array).unwrap();
         let names: Vec<&str> = shapes.iter().filter_map(|shape| shape["properties"]["shape"]["const"].as_str()).collect();
-        assert_eq!((names.len(), shapes.len()), (39, 39), "{schema:?}");
-        assert_eq!((names[0], names[23], names[24], names[38]), ("torque", "unsettled", "unequal_bend", "time_curve"));
+        assert_eq!((names.len(), shapes.len()), (40, 40), "{schema:?}");
+        assert_eq!((names[0], names[24], names[25], names[39]), ("torque", "unsettled", "unequal_bend", "time_curve"));
         assert!(schema.get("anyOf").is_none());
     }
 

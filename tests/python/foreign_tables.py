@@ -158,6 +158,7 @@ def main():
     simple("wound_up_joint_2", 7, 80, wound_up)
     knocked("base_away_for_25_rows", 8, 90, "base", 40, 65, (3e-4, -2e-4, 1e-4), (1e-4, 2e-4, -3e-4))
     knocked("tool_knocked_at_row_6", 9, 80, "tool", 6, 10**9, (4e-4, 1e-4, -3e-4), (3e-4, 0, 2e-4))
+    simple("yields_joint_4_without_masses", 11, 80, yields(3, 8e-5))
     down = (-9.81, 0.0, 0.0)
     columns = [("gravity_x", down[0]), ("gravity_y", down[1]), ("gravity_z", down[2])]
     simple("yields_joint_2_on_a_wall", 10, 80, yields(1, 4e-5), down, more=columns)

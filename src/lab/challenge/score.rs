@@ -764,7 +764,6 @@ fn confusion(truths: &[CaseTruth], verdicts: &[Verdict]) -> Vec<Confusion> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::Kind;
     use crate::effects::{Level, Location};
     use crate::lab::challenge::case::{Tails, TrueNoise};
     use crate::lab::challenge::verdict::{Candidate, Magnitude, nothing_at_all, oracle};

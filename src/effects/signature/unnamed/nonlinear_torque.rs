@@ -70,6 +70,10 @@ impl Follows for Hardening {
 }
 
 pub(super) fn hypotheses(site: &Site<'_>, joint: usize, all: &mut Vec<Hypothesis>) {
+    // Without masses nobody knows the torque, and what else it may do.
+    if !site.mechanism.masses_known {
+        return;
+    }
     let detail = format!("turn of joint {} not proportional to its torque", joint + 1);
     all.push(site.unnamed(Nameless::Softening(Softening { joint }), RANGE, vec![1.0, 0.5], detail.clone()));
     all.push(site.unnamed(Nameless::Hardening(Hardening { joint }), RANGE, vec![1.0; 2], detail));
