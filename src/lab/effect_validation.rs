@@ -655,8 +655,8 @@ impl<'a> Statics<'a> {
                     turn(joint, -0.5 * gain * f64::from(row.planned.approach()[joint]) * torque(joint).abs());
                 }
                 Effect::UnsettledReading { share } => {
-                    for joint in 0..q.len() {
-                        turn(joint, -share * (q[joint] - row.planned.from[joint]));
+                    for (joint, (to, from)) in q.iter().zip(&row.planned.from).enumerate() {
+                        turn(joint, -share * (to - from));
                     }
                 }
                 Effect::JointAngleMap { joint, ref angles, ref errors } => {

@@ -134,7 +134,7 @@ pub fn ripple(joint: usize, waves: u16, nameless: bool) -> Vec<Hypothesis> {
         OTHER_RATIOS / (RIPPLES.len() - sold.len()) as f64
     };
     let gear = |times: &u16| {
-        let ratio = (waves % times == 0).then(|| waves / times).filter(|ratio| *ratio >= RATIOS[0])?;
+        let ratio = waves.is_multiple_of(*times).then(|| waves / times).filter(|ratio| *ratio >= RATIOS[0])?;
         let weaker = half * WEAKER;
         Some(Hypothesis {
             shape: Shape::Gear(Gear { joint, ratio: f64::from(ratio), strongest: f64::from(*times) }),

@@ -505,10 +505,10 @@ fn of_foreign(truths: &[CaseTruth], verdicts: &[Verdict], foreign: &dyn Fn(&True
         let row = usize::from(effect.lambda.is_some_and(|lambda| lambda >= FLAGGED_FROM));
         let there = |kind: &str| truth.effects.iter().any(|effect| !foreign(effect) && effect.kind == kind);
         let right = |claim: &&NamedEffect| truth.effects.iter().any(|effect| foreign(effect) && is_case_of(claim, effect));
-        let misnamed = named(verdict).iter().any(|claim| !there(&claim.kind) && !right(&claim));
+        let misnamed = named(verdict).iter().any(|claim| !there(&claim.kind) && !right(claim));
         for row in [row, 2] {
             rows[row].cases += 1;
-            rows[row].flagged += usize::from(flagged(verdict) || named(verdict).iter().any(|claim| right(&claim)));
+            rows[row].flagged += usize::from(flagged(verdict) || named(verdict).iter().any(right));
             rows[row].misnamed += usize::from(misnamed);
         }
     }
