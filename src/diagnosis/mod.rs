@@ -37,6 +37,7 @@ pub(crate) mod rows;
 mod scatter;
 mod search;
 pub mod settings;
+mod signatures;
 #[cfg(test)]
 pub(crate) mod tests;
 mod unknown;

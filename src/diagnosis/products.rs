@@ -10,6 +10,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::evidence::Candidates;
 use super::rows::Rows;
+use super::signatures::{Signatures, dot};
 use crate::effects::signature::shape::Reading;
 use crate::numerics::gram;
 
@@ -29,11 +30,8 @@ pub(crate) struct Products {
 /// The rows of one fold.
 #[derive(Debug)]
 struct Fold {
-    /// Whitened signatures, column by column. They are by far the largest thing that a diagnosis holds, and as single precision they
-    /// are half of it: a rounding of 6e-8 of a signature is far below the noise of any sensor.
-    signatures: Vec<f32>,
-    /// Rows of `signatures`.
-    height: usize,
+    /// Whitened.
+    signatures: Signatures,
     /// Of the geometry.
     normal: DMatrix<f64>,
     /// Of the geometry with signatures and, last, the residual.
@@ -43,52 +41,6 @@ struct Fold {
     with_residual: Vec<f64>,
     residual: f64,
     equations: f64,
-}
-
-/// Of so many entries of a signature at most one is not zero where only those are looked at.
-const SPARSE: usize = 6;
-
-/// Sum of products, in an order that does not depend on the processor.
-fn dot<A: Copy + Into<f64>, B: Copy + Into<f64>>(a: &[A], b: &[B]) -> f64 {
-    let product = |a: A, b: B| -> f64 { a.into() * b.into() };
-    let mut sums = [0.0; 8];
-    let (blocks_a, blocks_b) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = blocks_a.remainder().iter().zip(blocks_b.remainder()).map(|(a, b)| product(*a, *b)).sum();
-    for (a, b) in blocks_a.zip(blocks_b) {
-        for lane in 0..8 {
-            sums[lane] += product(a[lane], b[lane]);
-        }
-    }
-    ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7])) + rest
-}
-
-/// Sums of products of `own` with every column of `signatures`, added to `sums`: four columns at a time, as `own` is read once for all
-/// of them.
-fn add_dots(own: &[f64], signatures: &[f32], sums: &mut [f64]) {
-    let height = own.len();
-    let part = |number: usize| &signatures[number * height..(number + 1) * height];
-    let mut blocks = sums.chunks_exact_mut(4);
-    let mut number = 0;
-    for block in &mut blocks {
-        let columns = [part(number), part(number + 1), part(number + 2), part(number + 3)];
-        let mut lanes = [[0.0; 4]; 4];
-        let whole = height / 4 * 4;
-        for at in (0..whole).step_by(4) {
-            for (lanes, column) in lanes.iter_mut().zip(columns) {
-                for lane in 0..4 {
-                    lanes[lane] += own[at + lane] * f64::from(column[at + lane]);
-                }
-            }
-        }
-        for ((sum, lanes), column) in block.iter_mut().zip(lanes).zip(columns) {
-            *sum += (lanes[0] + lanes[2]) + (lanes[1] + lanes[3]) + dot(&own[whole..], &column[whole..]);
-        }
-        number += 4;
-    }
-    for sum in blocks.into_remainder() {
-        *sum += dot(own, part(number));
-        number += 1;
-    }
 }
 
 fn column(matrix: &DMatrix<f64>, number: usize) -> &[f64] {
@@ -159,8 +111,8 @@ impl Products {
         let block = self.beside(number);
         let mut rows = vec![vec![0.0; width * self.folds.len()]; block.len()];
         for (number, fold) in self.folds.iter().enumerate() {
-            let parts = rows.iter_mut().map(|row| &mut row[number * width..(number + 1) * width]).collect();
-            fold.add_products(block.clone(), parts);
+            let parts = &mut rows.iter_mut().map(|row| &mut row[number * width..(number + 1) * width]).collect::<Vec<_>>();
+            fold.signatures.add_products(block.clone(), parts);
         }
         let rows: Vec<Arc<Vec<f64>>> = rows.into_iter().map(Arc::new).collect();
         let asked = Arc::clone(&rows[number - block.start]);
@@ -172,41 +124,6 @@ impl Products {
 }
 
 impl Fold {
-    /// Column `number` of the signatures.
-    fn signature(&self, number: usize) -> &[f32] {
-        &self.signatures[number * self.height..(number + 1) * self.height]
-    }
-
-    /// Products of each of the columns `block` with every column, added to its `sums`.
-    fn add_products(&self, block: Range<usize>, mut sums: Vec<&mut [f64]>) {
-        // The values of a map are nothing but near their angles: then one look at every other column serves all of them.
-        let entries: Vec<(usize, usize, f64)> = block
-            .clone()
-            .enumerate()
-            .flat_map(|(at, number)| {
-                self.signature(number).iter().enumerate().map(move |(row, value)| (row, at, f64::from(*value)))
-            })
-            .filter(|(.., value)| *value != 0.0)
-            .collect();
-        if block.len() == 1 || SPARSE * entries.len() > block.len() * self.height {
-            for (number, sums) in block.zip(sums) {
-                let own: Vec<f64> = self.signature(number).iter().map(|value| f64::from(*value)).collect();
-                add_dots(&own, &self.signatures, sums);
-            }
-            return;
-        }
-        let mut entries = entries;
-        entries.sort_by_key(|(row, at, _)| (*row, *at));
-        let mut of_block = vec![0.0; block.len()];
-        for (other, column) in self.signatures.chunks_exact(self.height.max(1)).enumerate() {
-            of_block.fill(0.0);
-            for (row, at, value) in &entries {
-                of_block[*at] += value * f64::from(column[*row]);
-            }
-            sums.iter_mut().zip(&of_block).for_each(|(sums, value)| sums[other] += value);
-        }
-    }
-
     fn new(
         rows: &Rows,
         readings: &[Reading],
@@ -220,52 +137,67 @@ impl Fold {
         let (geometry, width) = (rows.jacobian.ncols(), columns.last().map_or(0, |last| last.end));
         let equations = own_rows.iter().map(|row| rows.equations.of(*row).len()).sum();
         let mut jacobian = DMatrix::zeros(equations, geometry);
-        let mut signatures = vec![0.0_f32; equations * width];
         let mut left = vec![0.0; equations];
         let root = libm::sqrt(count);
-        let mut to = 0;
-        for row in own_rows {
-            let (from, number) = (rows.equations.of(*row).start, rows.equations.of(*row).len());
-            let mut values = vec![0.0; number];
+        let first: Vec<usize> = own_rows
+            .iter()
+            .scan(0, |to, row| {
+                let first = *to;
+                *to += rows.equations.of(*row).len();
+                Some(first)
+            })
+            .collect();
+        let mut values = Vec::new();
+        for (row, to) in own_rows.iter().zip(&first) {
+            let equations = rows.equations.of(*row);
             for parameter in 0..geometry {
-                values.iter_mut().enumerate().for_each(|(i, value)| *value = rows.jacobian[(from + i, parameter)]);
+                values.clear();
+                values.extend(equations.clone().map(|equation| rows.jacobian[(equation, parameter)]));
                 rows.whitening.apply(*row, &mut values);
                 values.iter().enumerate().for_each(|(i, value)| jacobian[(to + i, parameter)] = value * root);
             }
-            for (hypothesis, of) in candidates.hypotheses.iter().enumerate() {
-                let unit = candidates.unit[hypothesis];
-                for (i, moved) in of.shape.columns(&readings[*row], orientation).iter().enumerate() {
-                    let factor = unit * of.spread[i];
-                    values.iter_mut().zip(rows.read(*row, moved)).for_each(|(value, moved)| *value = moved * factor);
-                    rows.whitening.apply(*row, &mut values);
-                    let number = columns[hypothesis].start + i;
-                    let from = number * equations + to;
-                    values.iter().enumerate().for_each(|(i, value)| signatures[from + i] = (value * root) as f32);
-                }
-            }
-            values.iter_mut().enumerate().for_each(|(i, value)| *value = residual[from + i]);
+            values.clear();
+            values.extend(equations.map(|equation| residual[equation]));
             rows.whitening.apply(*row, &mut values);
             values.iter().enumerate().for_each(|(i, value)| left[to + i] = value * root);
-            to += number;
         }
-        let signature = |number: usize| &signatures[number * equations..(number + 1) * equations];
+        let mut signatures = Signatures::new(equations);
+        let mut own_columns: Vec<f32> = Vec::new();
+        for (hypothesis, of) in candidates.hypotheses.iter().enumerate() {
+            let unit = candidates.unit[hypothesis];
+            own_columns.clear();
+            own_columns.resize(equations * columns[hypothesis].len(), 0.0);
+            for (row, to) in own_rows.iter().zip(&first) {
+                for (i, moved) in of.shape.columns(&readings[*row], orientation).iter().enumerate() {
+                    if moved.iter().all(|value| *value == 0.0) {
+                        continue;
+                    }
+                    let factor = unit * of.spread[i];
+                    values.clear();
+                    values.extend(rows.read(*row, moved).into_iter().map(|moved| moved * factor));
+                    rows.whitening.apply(*row, &mut values);
+                    let from = i * equations + to;
+                    values.iter().enumerate().for_each(|(i, value)| own_columns[from + i] = (value * root) as f32);
+                }
+            }
+            (0..columns[hypothesis].len()).for_each(|i| signatures.push(&own_columns[i * equations..(i + 1) * equations]));
+        }
         let normal = gram(&jacobian);
         let mixed = DMatrix::from_fn(geometry, width + 1, |parameter, other| {
             let of_parameter = column(&jacobian, parameter);
-            if other < width { dot(of_parameter, signature(other)) } else { dot(of_parameter, &left) }
+            if other < width { signatures.with(other, of_parameter) } else { dot(of_parameter, &left) }
         });
         let own = columns
             .iter()
             .flat_map(|of| of.clone().flat_map(move |a| of.clone().map(move |b| (a, b))))
-            .map(|(a, b)| dot(signature(a), signature(b)))
+            .map(|(a, b)| signatures.between(a, b))
             .collect();
-        let with_residual = (0..width).map(|number| dot(signature(number), &left)).collect();
+        let with_residual = (0..width).map(|number| signatures.with(number, &left)).collect();
         // A row that counts half is half an equation.
         let weight = |row: &usize| count * rows.equations.of(*row).len() as f64 * rows.whitening.weights()[*row];
         Fold {
             residual: dot(&left, &left),
             equations: own_rows.iter().map(weight).sum(),
-            height: equations,
             signatures,
             normal,
             mixed,
@@ -408,7 +340,8 @@ impl<'a> Marginal<'a> {
         } else {
             // Of many columns, which no fold asks for.
             for fold in &self.products.folds {
-                fold.add_products(block.clone(), rows.iter_mut().map(Vec::as_mut_slice).collect());
+                let parts = &mut rows.iter_mut().map(Vec::as_mut_slice).collect::<Vec<_>>();
+                fold.signatures.add_products(block.clone(), parts);
             }
         }
         for (row, number) in rows.iter_mut().zip(block.clone()) {
@@ -440,7 +373,7 @@ impl<'a> Marginal<'a> {
                     (Some(row), _) => row[*b],
                     (None, Some(row)) => row[*a],
                     (None, None) => {
-                        let all: f64 = folds().map(|(_, fold)| dot(fold.signature(*a), fold.signature(*b))).sum();
+                        let all: f64 = folds().map(|(_, fold)| fold.signatures.between(*a, *b)).sum();
                         all - dot(column(&self.mixed, *a), column(&self.absorbed, *b))
                     }
                 };
@@ -545,9 +478,12 @@ pub(super) fn test_marginal(candidates: &Candidates, signatures: &DMatrix<f64>, 
         );
     }
     let width = signatures.ncols();
+    let mut whole = Signatures::new(signatures.nrows());
+    signatures.column_iter().for_each(|column| {
+        whole.push(&column.iter().map(|value| *value as f32).collect::<Vec<_>>());
+    });
     let fold = Fold {
-        signatures: signatures.iter().map(|value| *value as f32).collect(),
-        height: signatures.nrows(),
+        signatures: whole,
         normal: DMatrix::zeros(0, 0),
         mixed: DMatrix::zeros(0, width + 1),
         own,
