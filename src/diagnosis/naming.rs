@@ -6,6 +6,7 @@ use super::gap::Closing;
 use super::magnitude::{magnitude, unpulled};
 use super::outcome::{Effect, Magnitude, Parameters, Place};
 use super::parameters::{parameters, signature};
+use crate::effects::signature::shape::Size;
 use crate::effects::{Kind, Level};
 
 /// Effects that are named.
@@ -62,9 +63,11 @@ pub(super) fn name(analysis: &Analysis<'_>, closing: &Closing<'_>, unknown: bool
 fn outliers(analysis: &Analysis<'_>, closing: &Closing<'_>, unknown: bool) -> Option<Effect> {
     let outliers = &analysis.outliers;
     let is_left_out = analysis.options.without.contains(&Kind::MeasurementOutliers);
-    // A misfit has tails, too.
+    // A misfit has tails, too, and so has what lies between the values of a map.
     let settings = &analysis.options.settings;
-    let enough = if unknown { settings.outliers.factor_beside_unknown } else { settings.outliers.factor };
+    let is_rough = |hypothesis: usize| analysis.evidence.candidates.hypotheses[hypothesis].shape.size() == Size::Rms;
+    let rough = analysis.found.best.iter().any(|(hypothesis, _)| is_rough(*hypothesis));
+    let enough = if unknown || rough { settings.outliers.factor_beside_unknown } else { settings.outliers.factor };
     // So has the error of a joint that does not repeat.
     let scatters = !analysis.scatter.is_empty();
     let named = outliers.probability >= settings.decision.named && outliers.factor >= enough && !is_left_out && !scatters;

@@ -296,7 +296,7 @@ settings! {
         row: f64 = 0.99 => SHARE,
         /// Their noise over that of the others from which on they are named.
         factor: f64 = 4.0 => 1.0..=MANY,
-        /// The same beside something unknown: a misfit has tails, too.
+        /// The same beside something unknown, or a map of a joint's angle: a misfit has tails, too.
         factor_beside_unknown: f64 = 9.0 => 1.0..=MANY,
         /// Shares of the readings that are tried, each as likely.
         shares: Vec<f64> = vec![0.02, 0.03, 0.05, 0.08, 0.12, 0.18, 0.3] => 1e-6..=0.999,
