@@ -174,7 +174,7 @@ impl Fold {
                     }
                     let factor = unit * of.spread[i];
                     values.clear();
-                    values.extend(rows.read(*row, moved).into_iter().map(|moved| moved * factor));
+                    values.extend(rows.read(*row, moved).map(|moved| moved * factor));
                     rows.whitening.apply(*row, &mut values);
                     let from = i * equations + to;
                     values.iter().enumerate().for_each(|(i, value)| own_columns[from + i] = (value * root) as f32);

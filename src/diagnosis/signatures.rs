@@ -124,7 +124,8 @@ impl Signatures {
                         std::cmp::Ordering::Greater => drop(b.next()),
                         std::cmp::Ordering::Equal => {
                             sum += f64::from(*value) * f64::from(*of_other);
-                            (a.next(), b.next());
+                            a.next();
+                            b.next();
                         }
                     }
                 }
