@@ -12,6 +12,7 @@ use super::settings::Model;
 use crate::effects::signature::library::Columns;
 use crate::effects::signature::shape::{Displacement, FADING_S, FORGETTING_S, MEMORIES, Reading};
 use crate::measurement::Measurement;
+use crate::measurement::table::MOVED;
 
 /// Rows as signatures see them, and what the data have.
 #[derive(Clone, Debug)]
@@ -165,12 +166,9 @@ pub(crate) fn conditions(
 
 /// How many configurations there are.
 fn configurations(measurements: &[&Measurement]) -> usize {
-    let rounded = |row: &&Measurement| row.joints.iter().map(|value| (value / STOOD).round() as i64).collect::<Vec<_>>();
+    let rounded = |row: &&Measurement| row.joints.iter().map(|value| (value / MOVED).round() as i64).collect::<Vec<_>>();
     measurements.iter().map(rounded).collect::<BTreeSet<_>>().len()
 }
-
-/// Movement of a joint from reading to reading below which it stood, rad or m.
-const STOOD: f64 = 2e-4;
 
 /// Of each row, the way of each joint from the reading before, rad or m: none at the first of a session. `None` where the sides of approach
 /// tell of other moves: over a point between.
@@ -183,7 +181,7 @@ fn straight_moves(measurements: &[&Measurement], in_time: &[usize]) -> Option<Ve
         }
         for (joint, way) in moves[pair[1]].iter_mut().enumerate() {
             *way = row.joints[joint] - before.joints[joint];
-            if way.abs() > STOOD && f64::from(row.approach[joint]) * *way < 0.0 {
+            if way.abs() > MOVED && f64::from(row.approach[joint]) * *way < 0.0 {
                 return None;
             }
         }

@@ -2,8 +2,8 @@
 //! that were not used, what could not have been seen, and what remains unknown.
 //!
 //! Data (`groups`, `conditions`) → a linear problem about the fitted geometry and the effects found so far (`rows`, `linear`), made
-//! again until nothing changes → sets of effects with their probabilities, for which inner products suffice (`products`, `evidence`,
-//! `search`) → what they are worth on readings that were not used (`held_out`) → what that comes to ([`conclusion`]), which
+//! again until nothing changes → sets of effects with their probabilities, for which inner products suffice (`signatures`, `products`,
+//! `evidence`, `fitted`, `search`) → what they are worth on readings that were not used (`held_out`) → what that comes to ([`conclusion`]), which
 //! [`crate::report::wording`] puts into words ([`outcome`]).
 
 mod advice;

@@ -51,9 +51,9 @@ pub enum Kind {
     GravityLostMotion,
     /// First or second harmonic of the joint angle in the angle read.
     JointEccentricity,
-    /// Transmission error of a strain-wave gear: twice per turn of the wave generator.
+    /// Ripple of a gear: once, twice or four times per turn of its motor; of a strain-wave gear mostly twice.
     StrainWaveError,
-    /// Gear ratio error, and motion that leaks from a neighbouring joint.
+    /// Gear ratio error, and motion that leaks from a neighbouring joint or, as in wrists, from the one before it.
     GearCoupling,
     /// Links that grow with temperature.
     LinkThermalGrowth,
@@ -430,7 +430,7 @@ impl Kind {
             },
             Kind::StrainWaveError => &Descriptor {
                 name: "strain_wave_error",
-                about: "ripple twice per motor turn",
+                about: "ripple once, twice or four times per motor turn",
                 level: Level::Joint,
                 unit: Unit::Radian,
                 magnitude: "amplitude of the angle error",

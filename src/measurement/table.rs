@@ -24,7 +24,7 @@ pub struct Table {
 }
 
 /// A joint that moves by less has not moved, rad or m: joint readings come back rounded, or as encoders see them.
-const MOVED: f64 = 2e-4;
+pub(crate) const MOVED: f64 = 2e-4;
 
 impl Table {
     /// Where no sides of approach were recorded and rows are in the order of measuring, fills them in: a joint comes from where it was in
