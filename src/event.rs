@@ -1,6 +1,7 @@
 //! What happens in a run, in order. Live views, the recording and its replay all see this one type, and
 //! nothing that computes knows of them: steps report what they do ([`Progress`]), the session tells it as events.
 
+use crate::identification::ladder::Freedom;
 use crate::design::outcome::{DesignOutcome, SearchStep, SwarmIteration};
 use crate::diagnosis::outcome::Diagnosis;
 use crate::identification::outcome::Identification;
@@ -78,6 +79,12 @@ pub struct RealCell {
     /// Declared orientation noise, one sigma per axis, rad; unused where only positions were measured.
     #[serde(rename = "attitude_sigma_rad")]
     pub orientation_sigma_rad: f64,
+    /// What alone is let loose of the arm, where somebody said so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub only: Option<Freedom>,
+    /// Where each joint's zero is looked for, rad or m; empty for nominal.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub zeros: Vec<f64>,
 }
 
 /// Whoever listens to a run: takes its events in order.

@@ -11,7 +11,10 @@ use crate::diagnosis::rows::DiagnosisError;
 use crate::diagnosis::settings::Settings;
 use crate::diagnosis::{self, Options};
 use crate::event::{Event, Listener, RealCell, Start, measurements};
-use crate::identification::alignment::{AlignmentError, align};
+use crate::identification::alignment::align;
+use crate::identification::geometry::GeometryError;
+use crate::identification::ladder::Freedom;
+use crate::identification::real::Wishes;
 use crate::identification::outcome::Identification;
 use crate::identification::{self, IdentificationError, identify};
 use crate::measurement::{Measurement, Role, Sensor};
@@ -43,7 +46,7 @@ pub enum SessionError {
     Identification(#[from] IdentificationError),
     /// Placing a real arm.
     #[error(transparent)]
-    Alignment(#[from] AlignmentError),
+    Alignment(#[from] GeometryError),
     /// Reading a robot.
     #[error(transparent)]
     Urdf(#[from] UrdfError),
@@ -159,6 +162,10 @@ pub struct RealArm {
     pub sensor: Sensor,
     /// Whether nobody declared it.
     pub noise_assumed: bool,
+    /// What is to be let loose, where somebody said so.
+    pub only: Option<Freedom>,
+    /// Where each joint's zero is looked for, rad or m; empty for nominal.
+    pub zeros: Vec<f64>,
     /// What was left out of the robot's file.
     pub notes: Vec<String>,
 }
@@ -196,7 +203,7 @@ pub fn real_arm(real: &RealCell, robot: (Arm, Vec<String>), measurements: &[Meas
     let fit: Vec<&Measurement> = measurements.iter().filter(|measurement| measurement.role == Role::Fit).collect();
     let (nominal, notes) = robot;
     let arm = align(&nominal, &sensor, &fit)?;
-    Ok(RealArm { robot: nominal, arm, sensor, noise_assumed: real.noise_assumed, notes })
+    Ok(RealArm { robot: nominal, arm, sensor, noise_assumed: real.noise_assumed, only: real.only, zeros: real.zeros.clone(), notes })
 }
 
 /// Identifies a real arm and tells the listener.
@@ -208,10 +215,11 @@ pub fn identify_real(
     measurements: &[Measurement],
     listener: &mut dyn Listener,
 ) -> Result<Identification, SessionError> {
+    let wishes = Wishes { only: real.only, zeros: &real.zeros };
     let mut identification = if real.noise_assumed {
-        identification::identify_real_without_noise(&real.robot, &real.arm, &real.sensor, measurements)?
+        identification::identify_real_without_noise(&real.robot, &real.sensor, measurements, wishes)?
     } else {
-        identification::identify_real(&real.robot, &real.arm, &real.sensor, measurements)?
+        identification::identify_real(&real.robot, &real.sensor, measurements, wishes)?
     };
     let frames = "nominal means: the measurement frame and the target fitted, the robot as its file says";
     identification.notes.push(frames.to_owned());

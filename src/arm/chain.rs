@@ -491,6 +491,20 @@ impl FrameErrors {
         self.kinds.len() - 1
     }
 
+    /// Which error of the frames is the zero of `joint` (from 0): the turn about its axis, or the shift along it where it slides. That of
+    /// the first joint is part of the base.
+    #[must_use]
+    pub fn zero_of(&self, joint: usize) -> Option<usize> {
+        let frame = joint.checked_sub(1)?;
+        Some(Self::PER_FRAME * frame + if *self.kinds.get(joint)? == JointKind::Revolute { 3 } else { 2 })
+    }
+
+    /// Whether error number `at` is a joint's zero.
+    #[must_use]
+    pub fn is_zero(&self, at: usize) -> bool {
+        self.zero_of(at / Self::PER_FRAME + 1) == Some(at)
+    }
+
     /// The arm with the frame errors `errors` (six each), its root at `measurement_from_root` and a target at `tool_from_target`. The
     /// Jacobian's columns are: six of the root's pose, the frames', six of the target's pose, each in the frame itself.
     ///

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::identification::ladder::Freedom;
+
 /// Calibration of robot arms with a physics simulator in the loop.
 #[derive(Debug, Parser)]
 #[command(
@@ -328,6 +330,30 @@ pub(crate) struct DiagnoseOptions {
     pub(crate) partial: bool,
 }
 
+/// Rungs of the ladder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Only {
+    /// Base and target: the arm stays nominal
+    Base,
+    /// The joints' zeros
+    Zeros,
+    /// Zeros and link lengths
+    Lengths,
+    /// The whole geometry
+    Geometry,
+}
+
+impl From<Only> for Freedom {
+    fn from(only: Only) -> Freedom {
+        match only {
+            Only::Base => Freedom::BaseAndTarget,
+            Only::Zeros => Freedom::Zeros,
+            Only::Lengths => Freedom::Lengths,
+            Only::Geometry => Freedom::Geometry,
+        }
+    }
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct IdentifyOptions {
     /// Recording (.mcap) or table of measurements (.csv)
@@ -337,9 +363,12 @@ pub(crate) struct IdentifyOptions {
     pub(crate) evaluate: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) robot: RobotOptions,
-    /// Print every identifiable combination
+    /// Print what each joint is off, and every identifiable combination
     #[arg(long)]
     pub(crate) parameters: bool,
+    /// What alone is to be let loose of a real arm beside its base and target [default: what predicts readings best that are left out]
+    #[arg(long, value_enum)]
+    pub(crate) only: Option<Only>,
     /// Use a recording that was cut off, up to the cut
     #[arg(long)]
     pub(crate) partial: bool,

@@ -70,6 +70,8 @@ fn real_cell(
     let joint_count = nominal.0.joint_count();
     input::check_joints(&options.input, &measurements, joint_count)?;
     let measurements = with_evaluation(measurements, options, &nominal.0)?;
+    let real = &RealCell { only: options.only.map(Into::into), ..real.clone() };
+    let start = Start { real: Some(real.clone()), ..start };
     let real = session::real_arm(real, nominal, &measurements).with_context(|| options.input.display().to_string())?;
 
     // Parameters that are free enough explain wrong units, too.
@@ -98,6 +100,9 @@ fn conclude(
     let path = output::write_calibrated(global.out.join(format!("{stem}.urdf")), arm, identification)?;
     output::show(global, &report::identification(identification))?;
     if options.parameters {
+        if !identification.joint_frames.is_empty() {
+            output::show(global, &report::joint_frames(identification))?;
+        }
         output::show(global, &report::combinations(identification))?;
     }
     if let Some(recording) = recording {

@@ -56,6 +56,8 @@ pub(crate) fn described(command: &str, robot: &Path, options: &RobotOptions) -> 
         position_sigma_m: options.position_noise_um.unwrap_or(POSITION_NOISE_UM) * 1e-6,
         noise_assumed: options.position_noise_um.is_none(),
         orientation_sigma_rad: options.orientation_noise_deg.unwrap_or(ORIENTATION_NOISE_DEG).to_radians(),
+        only: None,
+        zeros: Vec::new(),
     };
     Ok((Start { real: Some(real.clone()), ..session::start_event(command, &scene) }, real))
 }

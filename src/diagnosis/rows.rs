@@ -166,7 +166,7 @@ pub(crate) fn first_fit(
     settings: &Model,
 ) -> Result<First, DiagnosisError> {
     let weights = vec![1.0; measurements.len()];
-    let readings = geometry::Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[] };
+    let readings = geometry::Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[], zeros: &[] };
     let loose = geometry::fit(arm, readings)?;
     let rows = of_geometry(arm, measurements, loose.clone());
     let mechanism = Mechanism::new(arm);
@@ -203,7 +203,7 @@ pub(crate) fn first_fit(
 pub(crate) fn fit(arm: &Arm, readings: Readings<'_>) -> Result<Rows, DiagnosisError> {
     let Readings { sensor, measurements, weights, displacement, scatter } = readings;
     let scatter: Vec<(usize, f64)> = scatter.iter().map(|one| (one.joint, one.sigma)).collect();
-    let fitted = geometry::fit(arm, geometry::Readings { sensor, measurements, weights, displacement, scatter: &scatter })?;
+    let fitted = geometry::fit(arm, geometry::Readings { sensor, measurements, weights, displacement, scatter: &scatter, zeros: &[] })?;
     Ok(of_geometry(arm, measurements, fitted))
 }
 

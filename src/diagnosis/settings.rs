@@ -177,7 +177,7 @@ settings! {
         choosing: usize = 3 => 1.0..=100.0,
         /// Sigmas of the geometry's prior over those of manufacturing (5 mm, 10 mrad) that are tried: the readings say how far the arm is
         /// from nominal.
-        geometry_scales: Vec<f64> = crate::identification::geometry::SCALES.to_vec() => 1e-6..=1e3,
+        geometry_scales: Vec<f64> = crate::identification::prior::SCALES.to_vec() => 1e-6..=1e3,
         /// Of the noise, the difference between loads as they are and as they are read that is worth trying both.
         loads_matter: f64 = 0.3 => 0.0..=MANY,
         /// Passes in which both are tried: those in which the geometry's prior is chosen, and two around it.

@@ -4,24 +4,20 @@
 //! Base and target are free, each session may have a base of its own and each target on the tool has its place. Every joint frame but the
 //! first is off by six small errors ([`FrameErrors`]) with Gaussian priors of the size that machining and assembly leave.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::least_squares::{difference, turn_to_residual};
+use super::prior::{Evidence, Sizes};
+use super::standing::stand;
 use crate::arm::chain::FrameErrors;
 use crate::arm::frames::{Pose, pose_from_parts, registration, rotation_from_vector, rotation_vector};
 use crate::arm::{Arm, ChainAt};
 use crate::measurement::equations::{COMPONENTS, Equations};
 use crate::measurement::{Measurement, Sensor};
-use crate::numerics::{gram, product};
+use crate::numerics::gram;
 use crate::solver::whitening::Whitening;
 use crate::solver::{Fit, Linearised, Problem, Stop, robust, solve};
 
-/// One sigma of a joint frame's position, m: machining and assembly are better than this.
-pub const FRAME_SHIFT: f64 = 5e-3;
-/// One sigma of a joint frame's orientation, rad.
-pub const FRAME_TURN: f64 = 10e-3;
-/// Sigmas of the frames' priors over those of manufacturing that an arm may have: the readings say which.
-pub const SCALES: [f64; 7] = [3.0, 1.0, 0.3, 0.1, 0.03, 0.01, 0.003];
 /// Base and target are free: so wide, about where the fit finds them, that it never binds; m and rad.
 pub const FREE: f64 = 50e-3;
 /// Different configurations that a fit needs.
@@ -85,6 +81,8 @@ pub struct Readings<'a> {
     pub displacement: &'a [[f64; COMPONENTS]],
     /// Joints (from 0) whose motion scatters, and one sigma of that, rad or m.
     pub scatter: &'a [(usize, f64)],
+    /// Where the fit begins with each joint's zero, rad or m; empty for nominal.
+    pub zeros: &'a [f64],
 }
 
 /// A fitted geometry, and what it leaves of the readings.
@@ -127,23 +125,27 @@ pub struct Geometry {
 impl Geometry {
     /// Sigmas of the frames' priors over those of manufacturing.
     #[must_use]
-    pub fn scale(&self) -> f64 {
-        self.placed.scale
+    pub fn sizes(&self) -> Sizes {
+        self.placed.sizes
     }
 
-    /// The scale of [`SCALES`] of which the readings are likeliest: marginal likelihood to first order, base and target free, the
-    /// noise's size unknown.
+    /// Sizes of the frames' errors of which the readings are likeliest ([`super::prior`]).
     #[must_use]
-    pub fn likeliest_scale(&self) -> f64 {
+    pub fn likeliest_sizes(&self) -> Sizes {
         let sigma = libm::sqrt(self.level);
         let residual = self.whitening.of_vector(&self.residual) / sigma;
         let jacobian = self.whitening.of(&self.jacobian) / sigma;
-        let normal = gram(&jacobian);
-        let with_residual = product(&jacobian.transpose(), &DMatrix::from_column_slice(residual.len(), 1, residual.as_slice()));
-        let square = residual.norm_squared();
-        let of = |scale: f64| likelihood(&normal, &with_residual, square, residual.len(), &self.placed, &self.free, scale);
-        let likeliest = SCALES.into_iter().map(|scale| (of(scale), scale)).max_by(|a, b| a.0.total_cmp(&b.0));
-        likeliest.map_or(1.0, |(_, scale)| scale)
+        let evidence = Evidence {
+            normal: gram(&jacobian),
+            with_residual: jacobian.tr_mul(&residual),
+            square: residual.norm_squared(),
+            equations: residual.len(),
+            parameters: &self.placed.parameters,
+            free: &self.free,
+            group: Evidence::groups(&self.frames, self.placed.before, &self.free),
+            sizes: self.placed.sizes,
+        };
+        evidence.likeliest()
     }
 
     /// The fitted parameters over the sigmas of their priors; zero where free.
@@ -167,7 +169,7 @@ impl Geometry {
     /// The fitted arm from its root to its tool.
     #[must_use]
     pub fn root_to_tool(&self) -> ChainAt {
-        self.frames.at(&Pose::identity(), &self.placed.errors(), &Pose::identity())
+        self.frames.at(&Pose::identity(), &self.placed.errors(&self.frames), &Pose::identity())
     }
 
     /// The pose of its target at which `measurement` should have found it. A session or target that was not fitted counts as the first.
@@ -178,13 +180,13 @@ impl Geometry {
         };
         let (session, target) = (number(&self.sessions, &measurement.session), number(&self.targets, &measurement.target));
         let base = &self.placed.measurement_from_root[session];
-        self.frames.at(base, &self.placed.errors(), &self.placed.tool_from_target[target]).forward(&measurement.joints)
+        self.frames.at(base, &self.placed.errors(&self.frames), &self.placed.tool_from_target[target]).forward(&measurement.joints)
     }
 
     /// Largest error of a frame along an axis (m) and about one (rad).
     #[must_use]
     pub fn largest_errors(&self) -> [f64; 2] {
-        let errors = self.placed.errors();
+        let errors = self.placed.errors(&self.frames);
         let largest = |turns: bool| {
             let of = errors.iter().enumerate().filter(|(at, _)| (at % FrameErrors::PER_FRAME >= 3) == turns);
             of.map(|(_, value)| value.abs()).fold(0.0, f64::max)
@@ -193,72 +195,35 @@ impl Geometry {
     }
 }
 
-/// Logarithm of the marginal likelihood of readings about a fit at `placed`, up to what does not depend on `scale`. `normal`,
-/// `with_residual`, `square`: inner products of the whitened Jacobian and residual (of `equations` equations).
-fn likelihood(
-    normal: &DMatrix<f64>,
-    with_residual: &DMatrix<f64>,
-    square: f64,
-    equations: usize,
-    placed: &Placed,
-    free: &[bool],
-    scale: f64,
-) -> f64 {
-    let (mut normal, mut with_residual, mut square) = (normal.clone(), with_residual.clone(), square);
-    let mut log = 0.0;
-    for at in 0..free.len() {
-        // The fit's own prior is one in its units.
-        let precision = if free[at] { 1.0 } else { (placed.scale / scale).powi(2) };
-        let offset = placed.parameters[at];
-        normal[(at, at)] += precision;
-        with_residual[at] -= precision * offset;
-        square += precision * offset * offset;
-        log += 0.5 * libm::log(precision);
-    }
-    let Some(cholesky) = Cholesky::new(normal) else {
-        return f64::NEG_INFINITY;
-    };
-    log -= (0..free.len()).map(|at| libm::log(cholesky.l_dirty()[(at, at)])).sum::<f64>();
-    let left = square - with_residual.dot(&cholesky.solve(&with_residual));
-    let beyond = equations.saturating_sub(free.iter().filter(|free| **free).count()).max(1) as f64;
-    log - 0.5 * beyond * libm::log(left.max(1e-12))
-}
-
 /// Fits base, target and geometry of `arm` to `readings`. Sessions get bases of their own where that is worth it.
 ///
 /// # Errors
 /// If the readings cannot tell.
 pub fn fit(arm: &Arm, readings: Readings<'_>) -> Result<Geometry, GeometryError> {
-    fit_at(arm, readings, 1.0)
+    fit_at(arm, readings, Sizes::MANUFACTURING)
 }
 
-/// The same with priors of the size that the readings speak for ([`Geometry::likeliest_scale`]): few or coarse readings of an arm that
-/// is made well leave it nearly nominal, where priors of manufacturing would make it worse.
-///
-/// # Errors
-/// As [`fit`].
-pub fn fit_shrunk(arm: &Arm, readings: Readings<'_>) -> Result<Geometry, GeometryError> {
-    let loose = fit(arm, readings)?;
-    let scale = loose.likeliest_scale();
-    if scale == loose.scale() { Ok(loose) } else { fit_at(arm, readings, scale) }
-}
-
-/// The residual that [`fit_shrunk`] leaves (m and rad), where `loose` is what [`fit`] makes of the same readings.
+/// The residual (m and rad) that is left with priors of the size that the readings speak for ([`Geometry::likeliest_sizes`]), where `loose`
+/// is what [`fit`] makes of the same readings.
 ///
 /// # Errors
 /// As [`fit`].
 pub fn shrunk_residual(arm: &Arm, readings: Readings<'_>, loose: &Geometry) -> Result<DVector<f64>, GeometryError> {
-    let scale = loose.likeliest_scale();
-    if scale == loose.scale() { Ok(loose.residual.clone()) } else { Ok(fit_at(arm, readings, scale)?.residual) }
+    let sizes = loose.likeliest_sizes();
+    if sizes == loose.sizes() { Ok(loose.residual.clone()) } else { Ok(fit_at(arm, readings, sizes)?.residual) }
 }
 
-fn fit_at(arm: &Arm, readings: Readings<'_>, scale: f64) -> Result<Geometry, GeometryError> {
+/// As [`fit`] with priors of the frames' errors of these sizes.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_at(arm: &Arm, readings: Readings<'_>, sizes: Sizes) -> Result<Geometry, GeometryError> {
     let (names, session) = numbered(readings.measurements, |row| row.session.as_deref());
-    let together = fit_with(arm, readings, &vec![0; session.len()], vec![String::new()], scale)?;
+    let together = fit_with(arm, readings, &vec![0; session.len()], vec![String::new()], sizes)?;
     if names.len() < 2 {
         return Ok(together);
     }
-    let apart = fit_with(arm, readings, &session, names.clone(), scale)?;
+    let apart = fit_with(arm, readings, &session, names.clone(), sizes)?;
     let added = (FrameErrors::PER_FRAME * (names.len() - 1)) as f64;
     let left = (apart.residual.len() as f64 - apart.jacobian.ncols() as f64).max(1.0);
     if (together.cost - apart.cost) / added < OWN_BASE * apart.cost / left {
@@ -283,6 +248,64 @@ fn fit_at(arm: &Arm, readings: Readings<'_>, scale: f64) -> Result<Geometry, Geo
     Ok(Geometry { notes: vec![note], ..apart })
 }
 
+impl Geometry {
+    /// The same readings with priors of other sizes, from here on: sessions have the bases that they have here.
+    ///
+    /// # Errors
+    /// As [`fit`].
+    pub fn refit(&self, arm: &Arm, readings: Readings<'_>, sizes: Sizes) -> Result<Geometry, GeometryError> {
+        let mut problem = Placing::new(arm, readings, &self.session, self.sessions.len(), sizes)?;
+        let errors = self.placed.errors(&self.frames);
+        let mut start = Placed { sizes, ..self.placed.clone() };
+        for (at, error) in errors.iter().enumerate() {
+            let sigma = sizes.sigma(&self.frames, at);
+            start.parameters[start.before + at] = if sigma > 0.0 { error / sigma } else { 0.0 };
+        }
+        (problem.far, problem.level) = (self.far.clone(), self.level);
+        problem.whiten(&start);
+        Ok(Geometry { notes: self.notes.clone(), ..finish(problem, start, self.sessions.clone()) })
+    }
+
+    /// Errors of the joint frames from the second on, six each (m, rad), in the frame in which the joint moves about or along z.
+    #[must_use]
+    pub fn frame_errors(&self) -> Vec<f64> {
+        self.placed.errors(&self.frames)
+    }
+
+    /// Which frames these are.
+    #[must_use]
+    pub fn frames(&self) -> &FrameErrors {
+        &self.frames
+    }
+
+    /// First column of the frames' errors, those of the bases before it.
+    #[must_use]
+    pub fn first_of_frames(&self) -> usize {
+        self.placed.before
+    }
+
+    /// Covariance of what is fitted from the sensor's noise (where that is larger than declared, as large as it is) and the prior, in m and
+    /// rad: bases, frames, targets, each base and target in its own frame. `None` where the equations do not tell.
+    #[must_use]
+    pub fn covariance(&self) -> Option<DMatrix<f64>> {
+        let jacobian = self.whitening.of(&self.jacobian) / libm::sqrt(self.level);
+        let mut normal = gram(&jacobian);
+        (0..normal.nrows()).for_each(|at| normal[(at, at)] += 1.0);
+        let mut covariance = normal.cholesky()?.inverse();
+        let sigma: Vec<f64> = (0..self.free.len()).map(|column| self.sigma_of(column)).collect();
+        for (row, of_row) in sigma.iter().enumerate() {
+            for (column, of_column) in sigma.iter().enumerate() {
+                covariance[(row, column)] *= of_row * of_column;
+            }
+        }
+        Some(covariance)
+    }
+
+    fn sigma_of(&self, column: usize) -> f64 {
+        if self.free[column] { FREE } else { self.placed.sizes.sigma(&self.frames, column - self.placed.before) }
+    }
+}
+
 /// The names that `of` gives the rows, sorted, and of each row the number of its own.
 fn numbered<'a>(measurements: &[&'a Measurement], of: impl Fn(&'a Measurement) -> Option<&'a str>) -> (Vec<String>, Vec<usize>) {
     let own: Vec<&str> = measurements.iter().map(|row| of(row).unwrap_or_default()).collect();
@@ -293,25 +316,31 @@ fn numbered<'a>(measurements: &[&'a Measurement], of: impl Fn(&'a Measurement) -
     (names.into_iter().map(str::to_owned).collect(), which)
 }
 
-/// As [`fit`] with sigmas of the frames' priors of `scale` times those of manufacturing; `session` of each row, which have these names.
+/// As [`fit_at`]; `session` of each row, which have these names.
 fn fit_with(
     arm: &Arm,
     readings: Readings<'_>,
     session: &[usize],
     sessions: Vec<String>,
-    scale: f64,
+    sizes: Sizes,
 ) -> Result<Geometry, GeometryError> {
-    let mut problem = Placing::new(arm, readings, session, sessions.len(), scale)?;
+    let mut problem = Placing::new(arm, readings, session, sessions.len(), sizes)?;
     let start = problem.start(arm)?;
-    let free = problem.free.clone();
-    let of_free: Vec<usize> = (0..free.len()).filter(|column| free[*column]).collect();
-    let all: Vec<usize> = (0..free.len()).collect();
+    let of_free: Vec<usize> = (0..problem.free.len()).filter(|column| problem.free[*column]).collect();
     // Base and target first: what is fitted with them far off would throw the frames about.
     let placed = problem.robustly(&of_free, start, STEPS[0]).point;
     problem.whiten(&placed);
-    let mut fit = problem.robustly(&all, placed, STEPS[1]);
+    Ok(finish(problem, placed, sessions))
+}
+
+/// Fits all that `problem` leaves free, from `start`.
+fn finish(mut problem: Placing<'_>, start: Placed, sessions: Vec<String>) -> Geometry {
+    let free = problem.free.clone();
+    let moves = |column: &usize| free[*column] || problem.sigma[*column] > 0.0;
+    let all: Vec<usize> = (0..free.len()).filter(moves).collect();
+    let mut fit = problem.robustly(&all, start, STEPS[1]);
     let mut steps = fit.steps;
-    if !readings.scatter.is_empty() {
+    if !problem.readings.scatter.is_empty() {
         // What scatter does was that of the nominal arm.
         problem.whiten(&fit.point);
         fit = problem.robustly(&all, fit.point, STEPS[1]);
@@ -320,7 +349,7 @@ fn fit_with(
     let far = std::mem::take(&mut problem.far);
     problem.whiten(&fit.point);
     let (residual, jacobian) = problem.raw(&fit.point);
-    Ok(Geometry {
+    Geometry {
         far,
         level: problem.level,
         cost: problem.level * fit.linearised.cost(),
@@ -331,14 +360,14 @@ fn fit_with(
         jacobian,
         free,
         sessions,
-        session: session.to_vec(),
+        session: problem.session.to_vec(),
         targets: problem.targets,
         target: problem.target,
         equations: problem.equations,
         whitening: problem.whitening,
         frames: problem.frames,
         notes: Vec::new(),
-    })
+    }
 }
 
 /// All that is fitted.
@@ -352,21 +381,16 @@ struct Placed {
     before: usize,
     /// Frame errors.
     count: usize,
-    /// Sigmas of the frames' priors over those of manufacturing.
-    scale: f64,
+    /// Sizes of the frames' priors.
+    sizes: Sizes,
 }
 
 impl Placed {
     /// Errors of the frames, m and rad.
-    fn errors(&self) -> Vec<f64> {
+    fn errors(&self, frames: &FrameErrors) -> Vec<f64> {
         let values = self.parameters.rows(self.before, self.count);
-        values.iter().enumerate().map(|(at, value)| value * self.scale * sigma_of_frame(at)).collect()
+        values.iter().enumerate().map(|(at, value)| value * self.sizes.sigma(frames, at)).collect()
     }
-}
-
-/// Sigma of a frame's error number `at`.
-fn sigma_of_frame(at: usize) -> f64 {
-    if at % FrameErrors::PER_FRAME < 3 { FRAME_SHIFT } else { FRAME_TURN }
 }
 
 /// The problem of placing an arm.
@@ -389,12 +413,12 @@ struct Placing<'a> {
     /// Mean square of the noise over the declared one: the prior's sigmas are true ones, so that they count for more where the noise is
     /// larger than declared.
     level: f64,
-    /// Sigmas of the frames' priors over those of manufacturing.
-    scale: f64,
+    /// Sizes of the frames' priors.
+    sizes: Sizes,
 }
 
 impl<'a> Placing<'a> {
-    fn new(arm: &Arm, readings: Readings<'a>, session: &'a [usize], bases: usize, scale: f64) -> Result<Self, GeometryError> {
+    fn new(arm: &Arm, readings: Readings<'a>, session: &'a [usize], bases: usize, sizes: Sizes) -> Result<Self, GeometryError> {
         let measurements = readings.measurements;
         let expected = arm.joint_count();
         for (row, measurement) in measurements.iter().enumerate() {
@@ -417,7 +441,7 @@ impl<'a> Placing<'a> {
         let (before, count) = (FrameErrors::PER_FRAME * bases, FrameErrors::PER_FRAME * frames.frames());
         let width = before + count + per_target * targets.len();
         let free: Vec<bool> = (0..width).map(|column| !(before..before + count).contains(&column)).collect();
-        let sigma = (0..width).map(|column| if free[column] { FREE } else { scale * sigma_of_frame(column - before) }).collect();
+        let sigma = (0..width).map(|column| if free[column] { FREE } else { sizes.sigma(&frames, column - before) }).collect();
         let whitening = Whitening::new(&equations, inverse_sigmas(&equations), readings.weights);
         let (far, level) = (Vec::new(), 1.0);
         Ok(Placing {
@@ -434,7 +458,7 @@ impl<'a> Placing<'a> {
             sigma,
             far,
             level,
-            scale,
+            sizes,
         })
     }
 
@@ -442,48 +466,55 @@ impl<'a> Placing<'a> {
     fn start(&self, arm: &Arm) -> Result<Placed, GeometryError> {
         let measurements = self.readings.measurements;
         let nominal = arm.chain.at_nominal();
-        let poses: Vec<Pose> = measurements.iter().map(|row| nominal.forward(&row.joints)).collect();
-        let register = |rows: &dyn Fn(&usize) -> bool| {
-            let rows: Vec<usize> = (0..measurements.len()).filter(rows).collect();
-            let from: Vec<Vector3<f64>> = rows.iter().map(|row| poses[*row].translation.vector).collect();
-            let to: Vec<Vector3<f64>> = rows.iter().map(|row| measurements[*row].position().coords).collect();
-            if rows.is_empty() { None } else { registration(&from, &to) }
+        let zero = |joint: usize| self.readings.zeros.get(joint).copied().unwrap_or(0.0);
+        let pose = |row: &&Measurement| {
+            let joints: Vec<f64> = row.joints.iter().enumerate().map(|(joint, value)| value + zero(joint)).collect();
+            nominal.forward(&joints)
         };
-        // A coordinate that was not read is taken as zero where there are no others: near enough to begin with.
-        let whole = |row: &usize| measurements[*row].unread == [false; 3];
-        let of_all = register(&whole).or_else(|| register(&|_| true)).ok_or(GeometryError::Degenerate)?;
-        let measurement_from_root: Vec<Pose> = (0..self.bases)
-            .map(|base| {
-                let own = |row: &usize| self.session[*row] == base && whole(row);
-                let enough = self.bases > 1 && (0..measurements.len()).filter(own).count() >= OWN_START;
-                if enough { register(&own).unwrap_or(of_all) } else { of_all }
-            })
-            .collect();
-        let orientation = self.equations.has_orientation();
-        let tool_from_target = (0..self.targets.len())
-            .map(|target| {
-                // The first reading of each target tells its orientation well enough to start from.
-                let row = self.target.iter().position(|known| *known == target).filter(|_| orientation);
-                let turn = row.and_then(|row| {
-                    let tool = measurement_from_root[self.session[row]].rotation * poses[row].rotation;
-                    Some(tool.inverse() * measurements[row].orientation()?)
-                });
-                Pose::from_parts(Vector3::zeros().into(), turn.unwrap_or_default())
-            })
-            .collect();
+        let poses: Vec<Pose> = measurements.iter().map(pose).collect();
+        let of = |rows: &[usize]| {
+            let tools: Vec<Pose> = rows.iter().map(|row| poses[*row]).collect();
+            let read: Vec<&Measurement> = rows.iter().map(|row| measurements[*row]).collect();
+            let target: Vec<usize> = rows.iter().map(|row| self.target[*row]).collect();
+            stand(&tools, &read, &target, self.targets.len())
+        };
+        let of_session = |base: usize| (0..measurements.len()).filter(|row| self.session[*row] == base).collect::<Vec<usize>>();
+        // Of sessions with bases of their own the longest tells where the targets are.
+        let rows = (0..self.bases).map(of_session).max_by_key(Vec::len).unwrap_or_default();
+        let all = of(&rows).ok_or(GeometryError::Degenerate)?;
+        let tool_from_target = all.tool_from_target;
+        let base_of = |base: usize| {
+            let rows = of_session(base);
+            let whole: Vec<usize> = rows.iter().copied().filter(|row| measurements[*row].unread == [false; 3]).collect();
+            let rows = if whole.is_empty() { rows } else { whole };
+            if self.bases == 1 || rows.len() < OWN_START {
+                return None;
+            }
+            let from: Vec<Vector3<f64>> =
+                rows.iter().map(|row| (poses[*row] * tool_from_target[self.target[*row]]).translation.vector).collect();
+            let to: Vec<Vector3<f64>> = rows.iter().map(|row| measurements[*row].position().coords).collect();
+            registration(&from, &to)
+        };
+        let measurement_from_root = (0..self.bases).map(|base| base_of(base).unwrap_or(all.measurement_from_root)).collect();
+        let mut parameters = DVector::zeros(self.free.len());
+        for (joint, zero) in self.readings.zeros.iter().enumerate() {
+            if let Some(column) = self.frames.zero_of(joint).map(|at| FrameErrors::PER_FRAME * self.bases + at) {
+                parameters[column] = if self.sigma[column] > 0.0 { zero / self.sigma[column] } else { 0.0 };
+            }
+        }
         Ok(Placed {
             measurement_from_root,
             tool_from_target,
-            parameters: DVector::zeros(self.free.len()),
+            parameters,
             before: FrameErrors::PER_FRAME * self.bases,
             count: FrameErrors::PER_FRAME * self.frames.frames(),
-            scale: self.scale,
+            sizes: self.sizes,
         })
     }
 
     /// The chain of each pair of session and target, and where its Jacobian's columns belong.
     fn chains(&self, placed: &Placed) -> Vec<(ChainAt, Vec<Option<usize>>)> {
-        let errors = placed.errors();
+        let errors = placed.errors(&self.frames);
         let mut chains = Vec::with_capacity(self.bases * self.targets.len());
         for (session, base) in placed.measurement_from_root.iter().enumerate() {
             for (target, of_target) in placed.tool_from_target.iter().enumerate() {
@@ -548,7 +579,7 @@ impl<'a> Placing<'a> {
             far.iter_mut().filter(|weight| **weight >= robust::FAR).for_each(|weight| *weight = 1.0);
             let level = robust::level(&squares, &counts);
             // While the frames are held, no prior counts.
-            let level = if level > LEVEL && columns.len() == self.free.len() { level } else { 1.0 };
+            let level = if level > LEVEL && columns.iter().any(|column| !self.free[*column]) { level } else { 1.0 };
             let before = |row: usize| self.far.get(row).copied().unwrap_or(1.0);
             let same = far.iter().enumerate().all(|(row, weight)| (weight - before(row)).abs() < SETTLED)
                 && (level / self.level - 1.0).abs() < SETTLED;
@@ -684,7 +715,7 @@ mod tests {
         let mut six = |size: f64| -> Vec<f64> { (0..6).map(|_| stream.uniform(-size, size)).collect() };
         let bases: Vec<Pose> = (0..sessions).map(|_| FrameErrors::pose(&six(2.0))).collect();
         let target = FrameErrors::pose(&six(0.1));
-        let errors: Vec<f64> = (0..6 * frames.frames()).map(|at| wrong * sigma_of_frame(at) * stream.normal()).collect();
+        let errors: Vec<f64> = (0..6 * frames.frames()).map(|at| wrong * Sizes::MANUFACTURING.sigma(&frames, at) * stream.normal()).collect();
         (0..count)
             .map(|index| {
                 let joints: Vec<f64> = arm.chain.joints.iter().map(|of| stream.uniform(of.lower, of.upper)).collect();
@@ -718,6 +749,7 @@ mod tests {
                 weights: &weights,
                 displacement: &[],
                 scatter: &[],
+                zeros: &[],
             };
             let found = fit(&arm, of).unwrap();
             assert_eq!((found.stop, found.sessions.len()), (Stop::Converged, sessions));
@@ -735,7 +767,7 @@ mod tests {
         let mut rows = readings(&arm, 60, 1, 0.1, 0.0, &mut stream);
         let (unmoved, weights, sensor) = (rows.clone(), vec![1.0; rows.len()], sensor(true));
         let read: Vec<&Measurement> = unmoved.iter().collect();
-        let whole = Readings { sensor: &sensor, measurements: &read, weights: &weights, displacement: &[], scatter: &[] };
+        let whole = Readings { sensor: &sensor, measurements: &read, weights: &weights, displacement: &[], scatter: &[], zeros: &[] };
         let before = fit(&arm, whole).unwrap();
         let turn = before.measurement_from_root()[0].rotation;
         let displacement: Vec<[f64; 6]> = (0..60).map(|_| std::array::from_fn(|_| stream.uniform(-1e-3, 1e-3))).collect();
@@ -747,41 +779,6 @@ mod tests {
         let read: Vec<&Measurement> = rows.iter().collect();
         let after = fit(&arm, Readings { measurements: &read, displacement: &displacement, ..whole }).unwrap();
         assert!((after.residual - before.residual).amax() < 1e-8);
-    }
-
-    /// The marginal likelihood over that at another scale is the one of the dense covariance of the readings, the noise's size integrated
-    /// out: `|V|^(-1/2) (r' V^-1 r)^(-n/2)` with `V = I + scale^2 J J'`.
-    #[test]
-    fn scales_are_compared_by_the_likelihood_of_the_dense_covariance() {
-        let mut stream = stream(3, "test/scales");
-        let (rows, columns) = (14, 5);
-        let jacobian = DMatrix::from_fn(rows, columns, |_, _| 3.0 * stream.normal());
-        let read = DVector::from_fn(rows, |_, _| 2.0 * stream.normal());
-        let parameters = DVector::from_fn(columns, |_, _| stream.normal());
-        // About a fit that is somewhere: the readings are the residual and what the fitted parameters do.
-        let residual = &read - &jacobian * &parameters;
-        let placed = Placed {
-            measurement_from_root: Vec::new(),
-            tool_from_target: Vec::new(),
-            parameters,
-            before: 0,
-            count: columns,
-            scale: 1.0,
-        };
-        let ours = |scale: f64| {
-            let with_residual = jacobian.transpose() * DMatrix::from_column_slice(rows, 1, residual.as_slice());
-            let normal = jacobian.transpose() * &jacobian;
-            likelihood(&normal, &with_residual, residual.norm_squared(), rows, &placed, &vec![false; columns], scale)
-        };
-        let dense = |scale: f64| {
-            let covariance = DMatrix::identity(rows, rows) + &jacobian * jacobian.transpose() * (scale * scale);
-            let square = read.dot(&(covariance.clone().try_inverse().unwrap() * &read));
-            -0.5 * covariance.determinant().ln() - 0.5 * rows as f64 * square.ln()
-        };
-        for scale in [3.0, 0.3, 0.03, 1e-3] {
-            let (found, wanted) = (ours(scale) - ours(1.0), dense(scale) - dense(1.0));
-            assert!((found - wanted).abs() < 1e-9 * wanted.abs().max(1.0), "{scale}: {found} against {wanted}");
-        }
     }
 
     /// Few readings by a camera leave an arm that is nominal so, which priors of manufacturing do not; and errors of the size of
@@ -801,20 +798,22 @@ mod tests {
                 row.orientation_xyzw = row.orientation().map(|orientation| (turn * orientation).coords.into());
             }
             let fitted: Vec<&Measurement> = rows.iter().collect();
-            let of = Readings { sensor: &camera, measurements: &fitted, weights: &[1.0; 15], displacement: &[], scatter: &[] };
+            let of = Readings { sensor: &camera, measurements: &fitted, weights: &[1.0; 15], displacement: &[], scatter: &[], zeros: &[] };
             let square = |found: &Geometry| -> f64 {
                 others.iter().map(|row| difference(row, &found.predict(row)).fixed_rows::<3>(0).norm_squared()).sum()
             };
             loose_m += square(&fit(&arm, of).unwrap());
-            shrunk_m += square(&fit_shrunk(&arm, of).unwrap());
-            nominal_m += square(&fit_at(&arm, of, 1e-6).unwrap());
+            let loose = fit(&arm, of).unwrap();
+            shrunk_m += square(&loose.refit(&arm, of, loose.likeliest_sizes()).unwrap());
+            nominal_m += square(&fit_at(&arm, of, Sizes::NOMINAL).unwrap());
         }
         assert!(shrunk_m < 1.1 * nominal_m && loose_m > 2.0 * nominal_m, "{loose_m} {shrunk_m} {nominal_m}");
         let arm = arm(6, &mut stream);
         let rows = readings(&arm, 80, 1, 0.3, 2e-5, &mut stream);
         let fitted: Vec<&Measurement> = rows.iter().collect();
-        let of = Readings { sensor: &sensor(true), measurements: &fitted, weights: &[1.0; 80], displacement: &[], scatter: &[] };
-        assert_eq!(fit(&arm, of).unwrap().likeliest_scale(), 0.3);
+        let of = Readings { sensor: &sensor(true), measurements: &fitted, weights: &[1.0; 80], displacement: &[], scatter: &[], zeros: &[] };
+        let sizes = fit(&arm, of).unwrap().likeliest_sizes();
+        assert_eq!((sizes.lengths, sizes.turns), (0.3, 0.3), "{sizes:?}");
     }
 
     proptest! {
@@ -841,8 +840,9 @@ mod tests {
                 weights: &weights,
                 displacement: &[],
                 scatter: &[],
+                zeros: &[],
             };
-            let problem = Placing::new(&arm, of, &session, sessions, scale).unwrap();
+            let problem = Placing::new(&arm, of, &session, sessions, Sizes { zeros: scale, lengths: scale, turns: scale }).unwrap();
             let all: Vec<usize> = (0..problem.free.len()).collect();
             let start = problem.start(&arm).unwrap();
             let step = DVector::from_fn(all.len(), |_, _| away * stream.normal());

@@ -153,9 +153,11 @@ pub fn identify_on(
             if names.is_empty() { "more".to_owned() } else { names.join(", ") }
         ));
     }
-    let chain = arm.chain.at(&solution.point);
+    let (chain, at_nominal) = (arm.chain.at(&solution.point), arm.chain.at_nominal());
     let solved = Solved {
         values: &solution.point,
+        nominal: &|measurement| at_nominal.forward(&measurement.joints),
+        errors: None,
         predict: &|measurement| chain.forward(&measurement.joints),
         degrees_of_freedom: equations - rank,
         subspace,
@@ -181,8 +183,12 @@ pub(super) fn check_joints(arm: &Arm, measurements: &[Measurement]) -> Result<()
 pub(super) struct Solved<'a> {
     /// Of all parameters.
     pub(super) values: &'a [f64],
+    /// The nominal arm.
+    pub(super) nominal: &'a dyn Fn(&Measurement) -> Pose,
     /// The identified arm.
     pub(super) predict: &'a dyn Fn(&Measurement) -> Pose,
+    /// Standard error of each parameter that is estimated, where that is not the independent ones: m or rad.
+    pub(super) errors: Option<Vec<Option<f64>>>,
     /// Equations that the parameters leave.
     pub(super) degrees_of_freedom: usize,
     /// With the shares at the solution.
@@ -248,13 +254,17 @@ pub(super) fn conclude(
         .enumerate()
         .map(|(column, parameter)| {
             let position = subspace.independent.binary_search(&column).ok();
+            let standard_error = match &solved.errors {
+                Some(errors) => errors[column].map(|error| factor * error),
+                None => position.map(standard_error),
+            };
             ParameterEstimate {
                 name: parameter.name.clone(),
                 nominal: parameter.nominal,
                 identified: values[column],
-                standard_error: position.map(standard_error),
+                standard_error,
                 unit: parameter.quantity.unit().to_owned(),
-                dropped: position.is_none(),
+                dropped: standard_error.is_none() && values[column] == parameter.nominal,
             }
         })
         .collect();
@@ -263,7 +273,9 @@ pub(super) fn conclude(
         .iter()
         .enumerate()
         .map(|(position, &column)| {
-            let estimate = values[column] - nominal[column];
+            let stood_in = subspace.dropped.iter().enumerate();
+            let stood_in = stood_in.map(|(other, of)| subspace.share[(position, other)] * (values[*of] - nominal[*of]));
+            let estimate = values[column] - nominal[column] + stood_in.sum::<f64>();
             let error = standard_error(position);
             Combination {
                 name: arm.chain.parameters[column].name.clone(),
@@ -276,8 +288,7 @@ pub(super) fn conclude(
         })
         .collect();
 
-    let at_nominal = arm.chain.at(&nominal);
-    let at_nominal = |measurement: &Measurement| at_nominal.forward(&measurement.joints);
+    let at_nominal = solved.nominal;
     let residuals: Vec<Residual> = measurements
         .iter()
         .map(|measurement| Residual {
@@ -299,8 +310,8 @@ pub(super) fn conclude(
         solved.reason
     };
     let held_out_errors = (!held_out.is_empty()).then(|| errors_of(&held_out, predict));
-    let held_out_nominal = (!held_out.is_empty()).then(|| errors_of(&held_out, &at_nominal));
-    notes.extend(doubts(arm, values, &fit, predict, &fitted));
+    let held_out_nominal = (!held_out.is_empty()).then(|| errors_of(&held_out, at_nominal));
+    notes.extend(doubts(arm, if solved.errors.is_some() { &nominal } else { values }, &fit, predict, &fitted));
     match (&held_out_errors, &held_out_nominal) {
         (Some(after), Some(before)) => {
             if after.position_m.rms >= before.position_m.rms {
@@ -325,12 +336,14 @@ pub(super) fn conclude(
         residual_scale: (noise.known && degrees_of_freedom > 0).then_some(scale),
         parameters,
         combinations,
-        nominal: errors_of(&fit, &at_nominal),
+        nominal: errors_of(&fit, at_nominal),
         fitted,
         held_out: held_out_errors,
         held_out_nominal,
         declared_noise: DeclaredNoise { position_m: noise.position_m, rotation_rad: noise.rotation_rad },
         noise_estimated: false,
+        joint_frames: Vec::new(),
+        ladder: Vec::new(),
         residuals,
         notes,
     }

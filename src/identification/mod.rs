@@ -1,10 +1,14 @@
 //! From measurements to parameters, with what can be known about them.
 
 pub mod alignment;
+pub mod frames;
 pub mod geometry;
+pub mod ladder;
 pub mod least_squares;
 pub mod outcome;
+pub mod prior;
 pub mod real;
+pub mod standing;
 
 pub use alignment::align;
 pub use least_squares::{IdentificationError, fit_some, identify, identify_on};

@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::ladder::Rung;
+
 /// The identified arm and how well it predicts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Identification {
@@ -39,10 +41,41 @@ pub struct Identification {
     /// Whether nobody declared it, so that it is estimated from what is left.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub noise_estimated: bool,
+    /// How far the joint frames of a real arm are off its file, in the terms of the joints themselves; empty for the arm of a scene.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub joint_frames: Vec<JointFrame>,
+    /// How much of the arm was let loose, and how good that is on readings that were left out; empty for the arm of a scene.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ladder: Vec<Rung>,
     /// Residuals of every configuration, in the order of measuring.
     pub residuals: Vec<Residual>,
     /// What was assumed or left out.
     pub notes: Vec<String>,
+}
+
+/// How far the frame in which a joint moves is off its file. Of errors that the readings cannot tell apart these are the likeliest, given
+/// how far frames are off by machining; standard errors say so, too.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct JointFrame {
+    /// Name of the joint.
+    pub joint: String,
+    /// Error of its zero: what must be added to the reading; rad, or m where it slides.
+    pub zero: Deviation,
+    /// `rad` or `m`.
+    pub zero_unit: String,
+    /// Shifts of the axis, m: along x and y of the joint's frame (whose z is the axis), and along the axis where the joint turns.
+    pub shift_m: Vec<Deviation>,
+    /// Turns of the axis about x and y of the joint's frame, rad; about the axis, too, where the joint slides.
+    pub turn_rad: Vec<Deviation>,
+}
+
+/// An estimate with its standard error.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Deviation {
+    /// Estimate, SI.
+    pub estimate: f64,
+    /// Standard error, SI.
+    pub standard_error: f64,
 }
 
 /// One parameter.

@@ -3,9 +3,12 @@
 
 use nalgebra::{Cholesky, DMatrix};
 
-use super::geometry::{self, FRAME_SHIFT, FRAME_TURN, FREE, Geometry, Readings};
+use super::geometry::{FREE, Geometry, Readings};
+use super::ladder::{Climbed, Freedom, climb};
+use super::prior::{FRAME_SHIFT, FRAME_TURN, Sizes};
 use super::least_squares::{FOREIGN_ROBOT, IdentificationError, MAX_STEPS, Plain, Solved, check_joints, conclude};
-use super::outcome::Identification;
+use super::outcome::{Identification, JointFrame};
+use super::{alignment, frames};
 use crate::arm::{Arm, Quantity};
 use crate::measurement::equations::Equations;
 use crate::measurement::{Measurement, Role, Sensor, Weights};
@@ -18,33 +21,45 @@ use crate::solver::{Problem, robust, solve};
 const SAMPLES: usize = 60;
 /// Largest distance (m) by which they may miss it.
 const EXPRESSED: f64 = 1e-9;
+/// Least size of a prior that is reported of: what is held is known to this share of manufacturing.
+const LEAST_SIZE: f64 = 1e-6;
 /// Readings that are far off of which the number is said, at most.
 const FAR_SAID: usize = 12;
 /// A combination whose standard error is above this share of what was known of it beforehand is told by that, not by the data.
 const HARDLY_SEEN: f64 = 0.5;
 
-/// Identifies `robot` from `measurements` with [`Role::Fit`] in any frame, by the fit that a diagnosis makes with all weights one; `aligned`
-/// is the same arm in the measurement frame with base and target fitted alone ([`super::alignment::align`]), whose parameters are
-/// reported. Sessions may have bases of their own, and several targets may be read; the parameters of base and target are then those
-/// of the first.
+/// What somebody said about a calibration.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wishes<'a> {
+    /// What is to be let loose; the readings choose where nobody says.
+    pub only: Option<Freedom>,
+    /// Where the joints' zeros are looked for, rad or m; empty for nominal.
+    pub zeros: &'a [f64],
+}
+
+/// Identifies `robot` from `measurements` with [`Role::Fit`] in any frame. How much of the geometry is let loose is what predicts readings
+/// best that were left out ([`super::ladder`]); sessions may have bases of their own, and several targets may be read: the parameters of
+/// base and target are then those of the first.
 ///
 /// Readings that are far off from what the others say together (by the median of all) are left out, and named in the notes.
 ///
 /// Parameters that the data hardly show stay near their nominal values, for a prior whose size the readings choose
-/// ([`geometry::fit_shrunk`]) says how far this arm is off; the notes name them.
+/// ([`super::prior`]) says how far this arm is off; the notes name them.
 ///
 /// # Errors
 /// If there are too few measurements or they do not fit the arm.
 pub fn identify_real(
     robot: &Arm,
-    aligned: &Arm,
     sensor: &Sensor,
     measurements: &[Measurement],
+    wishes: Wishes<'_>,
 ) -> Result<Identification, IdentificationError> {
     check_joints(robot, measurements)?;
-    let far = far_off(robot, sensor, measurements)?;
+    let fit: Vec<&Measurement> = measurements.iter().filter(|row| row.role == Role::Fit).collect();
+    let climbed = climb_with(robot, sensor, &fit, wishes)?;
+    let far = far_off(sensor, measurements, &climbed.geometry);
     if far.is_empty() {
-        return identify_good(robot, aligned, sensor, measurements, Vec::new());
+        return tell(robot, sensor, measurements, wishes, climbed, Vec::new());
     }
     let good: Vec<Measurement> = measurements
         .iter()
@@ -63,7 +78,21 @@ pub fn identify_real(
         measurements.len(),
         list.join(", ")
     );
-    identify_good(robot, aligned, sensor, &good, vec![note])
+    let fit: Vec<&Measurement> = good.iter().filter(|row| row.role == Role::Fit).collect();
+    let climbed = climb_with(robot, sensor, &fit, wishes)?;
+    tell(robot, sensor, &good, wishes, climbed, vec![note])
+}
+
+fn climb_with(
+    robot: &Arm,
+    sensor: &Sensor,
+    fit: &[&Measurement],
+    wishes: Wishes<'_>,
+) -> Result<Climbed, IdentificationError> {
+    let weights = vec![1.0; fit.len()];
+    let readings =
+        Readings { sensor, measurements: fit, weights: &weights, displacement: &[], scatter: &[], zeros: wishes.zeros };
+    Ok(climb(robot, readings, wishes.only)?)
 }
 
 /// Smallest estimated noise over what is assumed first: below it readings are made by a computer, and any number would do.
@@ -76,11 +105,11 @@ const LEAST_NOISE: f64 = 1e-3;
 /// As [`identify_real`].
 pub fn identify_real_without_noise(
     robot: &Arm,
-    aligned: &Arm,
     sensor: &Sensor,
     measurements: &[Measurement],
+    wishes: Wishes<'_>,
 ) -> Result<Identification, IdentificationError> {
-    let first = identify_real(robot, aligned, sensor, measurements)?;
+    let first = identify_real(robot, sensor, measurements, wishes)?;
     let Some(scale) = first.residual_scale.filter(|scale| scale.is_finite()) else {
         return Ok(first);
     };
@@ -91,7 +120,7 @@ pub fn identify_real_without_noise(
         orientation_sigma_rad: sensor.orientation_sigma_rad.map(|sigma| scale * sigma),
         ..sensor.clone()
     };
-    let mut identification = identify_real(robot, aligned, &estimated, measurements)?;
+    let mut identification = identify_real(robot, &estimated, measurements, wishes)?;
     identification.noise_estimated = true;
     identification.notes.insert(
         0,
@@ -110,12 +139,8 @@ pub fn identify_real_without_noise(
     Ok(identification)
 }
 
-/// Rows of `measurements` that are far off from what the fitted ones say together, and by how much (m).
-fn far_off(robot: &Arm, sensor: &Sensor, measurements: &[Measurement]) -> Result<Vec<(usize, f64)>, IdentificationError> {
-    let fit: Vec<&Measurement> = measurements.iter().filter(|row| row.role == Role::Fit).collect();
-    let weights = vec![1.0; fit.len()];
-    let readings = Readings { sensor, measurements: &fit, weights: &weights, displacement: &[], scatter: &[] };
-    let geometry = geometry::fit_shrunk(robot, readings)?;
+/// Rows of `measurements` that are far off from what `geometry` says, and by how much (m).
+fn far_off(sensor: &Sensor, measurements: &[Measurement], geometry: &Geometry) -> Vec<(usize, f64)> {
     let all: Vec<&Measurement> = measurements.iter().collect();
     let equations = Equations::new(sensor, &all);
     let left: Vec<_> = all.iter().map(|row| super::least_squares::difference(row, &geometry.predict(row))).collect();
@@ -126,36 +151,49 @@ fn far_off(robot: &Arm, sensor: &Sensor, measurements: &[Measurement]) -> Result
     let squares: Vec<f64> = (0..all.len()).map(square).collect();
     let weights = robust::weights(&squares, &equations.counts());
     let far = (0..all.len()).filter(|row| weights[*row] < robust::FAR);
-    Ok(far.map(|row| (row, left[row].fixed_rows::<3>(0).norm())).collect())
+    far.map(|row| (row, left[row].fixed_rows::<3>(0).norm())).collect()
 }
 
-/// As [`identify_real`] of readings none of which is far off.
-fn identify_good(
+/// What `climbed` says of readings none of which is far off.
+fn tell(
     robot: &Arm,
-    aligned: &Arm,
     sensor: &Sensor,
     measurements: &[Measurement],
+    wishes: Wishes<'_>,
+    climbed: Climbed,
     mut notes: Vec<String>,
 ) -> Result<Identification, IdentificationError> {
     let fit: Vec<&Measurement> = measurements.iter().filter(|row| row.role == Role::Fit).collect();
+    let Climbed { geometry, rungs } = climbed;
+    let weights = vec![1.0; fit.len()];
+    let readings = Readings { sensor, measurements: &fit, weights: &weights, displacement: &[], scatter: &[], zeros: &[] };
+    let nominal = geometry.refit(robot, readings, Sizes::NOMINAL)?;
+    let aligned = &alignment::placed(robot, &nominal);
     let problem = Plain::new(aligned, sensor, Weights::Noise, &fit)?;
     let structure = Subspace::of_components(aligned, problem.equations().components());
     problem.enough(structure.rank())?;
-    let weights = vec![1.0; fit.len()];
-    let readings = Readings { sensor, measurements: &fit, weights: &weights, displacement: &[], scatter: &[] };
-    let geometry = geometry::fit_shrunk(robot, readings)?;
 
     notes.extend(geometry.notes.iter().cloned());
-    let (values, missed) = expressed(aligned, sensor, &structure, &geometry, &fit);
-    if missed > EXPRESSED {
-        notes.push(format!(
-            "the parameters of the robot's file cannot say all that was identified: the calibrated file is off by up to {:.3} mm",
-            missed * 1e3
-        ));
-    }
+    let covariance_of_all = geometry.covariance();
+    let told = covariance_of_all.as_ref().and_then(|covariance| frames::parameters(aligned, &geometry, covariance));
+    let (values, errors) = match told {
+        Some((values, errors)) => (values, Some(errors)),
+        None => {
+            let (values, missed) = expressed(aligned, sensor, &structure, &geometry, &fit);
+            if missed > EXPRESSED {
+                notes.push(format!(
+                    "the parameters of the robot's file cannot say all that was identified: the calibrated file is off by up to {:.3} mm",
+                    missed * 1e3
+                ));
+            }
+            (values, None)
+        }
+    };
+    let joint_frames =
+        covariance_of_all.as_ref().map_or_else(Vec::new, |covariance| frames::joint_frames(robot, &geometry, covariance));
     let linearised = problem.linearise(&values);
     let subspace = structure.at(&linearised.jacobian);
-    let (precision, known) = prior(aligned, &subspace, geometry.scale());
+    let (precision, known) = prior(aligned, &subspace, &geometry);
     let covariance = problem.covariance(&linearised.jacobian, &subspace, Some(&precision));
     // What the prior tells is no equation's doing.
     let told: f64 = numerics::product(&precision, &covariance).trace();
@@ -164,8 +202,21 @@ fn identify_good(
         .filter(|at| known[*at].is_some_and(|known| covariance[(*at, *at)].max(0.0).sqrt() > HARDLY_SEEN * known))
         .map(|at| aligned.chain.parameters[subspace.independent[at]].name.as_str())
         .collect();
-    let [shift, turn] = [geometry.scale() * FRAME_SHIFT * 1e3, geometry.scale() * FRAME_TURN * 1e3];
-    if 2 * hardly.len() > known.iter().flatten().count() {
+    let sizes = geometry.sizes();
+    let [shift, turn] = [sizes.lengths * FRAME_SHIFT * 1e3, sizes.turns * FRAME_TURN * 1e3];
+    let taken = rungs.iter().find(|rung| rung.chosen).map_or(Freedom::Geometry, |rung| rung.free);
+    if taken != Freedom::Geometry {
+        if wishes.only.is_none() {
+            notes.push(format!(
+                "more of the geometry than {} predicts readings that were left out worse: it stays as the file has it",
+                match taken {
+                    Freedom::Zeros => "the joints' zeros",
+                    Freedom::Lengths => "zeros and lengths",
+                    _ => "base and target, which are no part of the arm,",
+                }
+            ));
+        }
+    } else if 2 * hardly.len() > known.iter().flatten().count() {
         notes.push(format!(
             "these readings tell little of the arm's geometry: it is taken to be within about {shift:.2} mm and {turn:.2} mrad of nominal \
              frame by frame, which is what they speak for; a calibration needs more different configurations, or a better sensor"
@@ -189,14 +240,19 @@ fn identify_good(
             unread.join(", ")
         ));
     }
+    notes.extend(off_zero(&joint_frames));
+    notes.extend(absurd(&joint_frames));
     let predict = |measurement: &Measurement| geometry.predict(measurement);
-    Ok(conclude(
+    let at_nominal = |measurement: &Measurement| nominal.predict(measurement);
+    let identification = conclude(
         &problem,
         Weights::Noise,
         measurements,
         Solved {
             values: &values,
+            nominal: &at_nominal,
             predict: &predict,
+            errors,
             degrees_of_freedom: problem.equations().len().saturating_sub(seen),
             subspace,
             covariance,
@@ -205,7 +261,49 @@ fn identify_good(
             steps: geometry.steps,
             notes,
         },
-    ))
+    );
+    Ok(Identification { joint_frames, ladder: rungs, ..identification })
+}
+
+/// A shift (m) or turn (rad) of a joint's frame that no real arm has.
+const ABSURD: f64 = 0.06;
+
+/// Frames that are off by more than any arm's.
+fn absurd(joints: &[JointFrame]) -> Vec<String> {
+    let largest = |joint: &JointFrame| {
+        let all = joint.shift_m.iter().map(|of| (of.estimate, " mm")).chain(joint.turn_rad.iter().map(|of| (of.estimate, " mrad")));
+        all.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs())).filter(|(size, _)| size.abs() > ABSURD)
+    };
+    let said = |joint: &JointFrame| {
+        let (size, unit) = largest(joint)?;
+        let name = &joint.joint;
+        Some(format!("the frame of joint `{name}` is {:.0}{unit} from nominal: is it this robot, and are the units right?", size.abs() * 1e3))
+    };
+    joints.iter().filter_map(said).collect()
+}
+
+/// A zero so many standard errors off is off.
+const OFF_ZERO: f64 = 5.0;
+/// The least error of a zero that is worth a note of its own, rad or m: what a joint's frame is off by machining, three times over.
+const WORTH_SAYING: f64 = 3.0 * FRAME_TURN;
+
+/// Joints whose zeros are far off.
+fn off_zero(joints: &[JointFrame]) -> Vec<String> {
+    let off = |joint: &&JointFrame| {
+        let size = joint.zero.estimate.abs();
+        size > WORTH_SAYING && size > OFF_ZERO * joint.zero.standard_error
+    };
+    let said = |joint: &JointFrame| {
+        let (factor, unit) = if joint.zero_unit == "rad" { (1f64.to_degrees(), "°") } else { (1e3, " mm") };
+        let way = if joint.zero.estimate > 0.0 { "low" } else { "high" };
+        format!(
+            "joint `{}` reads {:.3}{unit} too {way} (standard error {:.3}{unit}): its zero is off",
+            joint.joint,
+            joint.zero.estimate.abs() * factor,
+            joint.zero.standard_error * factor
+        )
+    };
+    joints.iter().filter(off).map(said).collect()
 }
 
 /// The values of all parameters of `aligned` with which it does what `geometry` does, those that others stand in for at nominal; and by
@@ -243,16 +341,17 @@ fn expressed(aligned: &Arm, sensor: &Sensor, structure: &Subspace, geometry: &Ge
     (values, missed.fold(0.0, f64::max))
 }
 
-/// The prior of the independent parameters, which stand for the others too, its sigmas `scale` times those of manufacturing: its
+/// The prior of the independent parameters, which stand for the others too, its sigmas those of the `geometry`'s prior (an angle may be a zero or a twist): its
 /// precision, and one sigma of each that is not free.
-fn prior(aligned: &Arm, subspace: &Subspace, scale: f64) -> (DMatrix<f64>, Vec<Option<f64>>) {
+fn prior(aligned: &Arm, subspace: &Subspace, geometry: &Geometry) -> (DMatrix<f64>, Vec<Option<f64>>) {
     let parameters = &aligned.chain.parameters;
+    let sizes = geometry.sizes();
     // Base and target come first and last ([`crate::arm::Chain::in_measurement_frame`]).
     let free = |column: usize| column < 6 || column + 6 >= parameters.len();
     let sigma = |column: usize| match parameters[column].quantity {
         _ if free(column) => FREE,
-        Quantity::Length => scale * FRAME_SHIFT,
-        Quantity::Angle => scale * FRAME_TURN,
+        Quantity::Length => sizes.lengths.max(LEAST_SIZE) * FRAME_SHIFT,
+        Quantity::Angle => sizes.zeros.max(sizes.turns).max(LEAST_SIZE) * FRAME_TURN,
     };
     let rank = subspace.rank();
     let bound: Vec<usize> = (0..rank).filter(|at| !free(subspace.independent[*at])).collect();

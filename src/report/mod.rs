@@ -9,7 +9,8 @@ pub mod wording;
 use comfy_table::{Cell, CellAlignment, LineStyle, Table, TableStyle};
 
 use crate::design::outcome::{DesignOutcome, StopReason};
-use crate::identification::outcome::{Errors, Identification, Summary};
+use crate::identification::ladder::Rung;
+use crate::identification::outcome::{Deviation, Errors, Identification, JointFrame, Summary};
 use crate::quality::Indexes;
 use crate::quality::JacobianScaling;
 use crate::units::number;
@@ -188,13 +189,59 @@ pub fn identification(identification: &Identification) -> String {
     }
     let held: Vec<&str> =
         identification.parameters.iter().filter(|parameter| parameter.dropped).map(|parameter| parameter.name.as_str()).collect();
-    if !held.is_empty() {
+    // A real arm's file has parameters that base and target stand in for, always the same.
+    if !held.is_empty() && identification.ladder.is_empty() {
         text.push_str(&format!("Held at nominal: {}.\n", held.join(", ")));
+    }
+    if !identification.ladder.is_empty() {
+        text.push_str(&format!("\n{}\n", ladder(&identification.ladder)));
     }
     for note in &identification.notes {
         text.push_str(&format!("Note: {note}{}\n", if note.ends_with('?') { "" } else { "." }));
     }
     text
+}
+
+/// How much of the arm was let loose, and what that is worth on readings that were left out.
+fn ladder(rungs: &[Rung]) -> String {
+    let row = |rung: &Rung| {
+        vec![
+            rung.free.words().to_owned(),
+            number(rung.left_out_m * 1e3),
+            rung.left_out_rad.map_or_else(|| "–".to_owned(), |angle| number(angle.to_degrees())),
+            if rung.chosen { "taken" } else { "" }.to_owned(),
+        ]
+    };
+    table(&["let loose", "RMS on readings left out (mm)", "orientation (°)", ""], rungs.iter().map(row).collect())
+}
+
+/// How far each joint's frame is off, with standard errors.
+#[must_use]
+pub fn joint_frames(identification: &Identification) -> String {
+    let told = |of: Option<&Deviation>, factor: f64| match of {
+        Some(of) if of.estimate == 0.0 && of.standard_error == 0.0 => "held".to_owned(),
+        Some(of) => format!("{:.3} ± {:.3}", of.estimate * factor, of.standard_error * factor),
+        None => "–".to_owned(),
+    };
+    let row = |joint: &JointFrame| {
+        let (factor, unit) = if joint.zero_unit == "rad" { (1f64.to_degrees(), "°") } else { (1e3, " mm") };
+        let degrees = 1f64.to_degrees();
+        vec![
+            joint.joint.clone(),
+            format!("{}{unit}", told(Some(&joint.zero), factor)),
+            told(joint.shift_m.first(), 1e3),
+            told(joint.shift_m.get(1), 1e3),
+            told(joint.shift_m.get(2), 1e3),
+            told(joint.turn_rad.first(), degrees),
+            told(joint.turn_rad.get(1), degrees),
+        ]
+    };
+    let header = ["joint, axis along z", "zero", "x (mm)", "y (mm)", "z (mm)", "about x (°)", "about y (°)"];
+    format!(
+        "{}\nWhat each joint's frame is off its file, with standard errors; of errors that these readings cannot tell apart, the likeliest.\n\
+         The zero is what must be added to the reading.\n",
+        table(&header, identification.joint_frames.iter().map(row).collect())
+    )
 }
 
 fn error_row(name: &str, errors: &Errors) -> Vec<String> {

@@ -1,0 +1,176 @@
+//! How much of an arm readings can tell: base and target alone, then joint zeros, then lengths, then the whole geometry, each judged by
+//! readings that it was not fitted to.
+//!
+//! Every rung has priors of the size that the readings choose ([`super::prior`]). What decides is the error on readings that are left out,
+//! fold by fold of different configurations: a rung that only fits noise is worse there than the one below.
+
+use nalgebra::DVector;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::geometry::{Geometry, GeometryError, Readings, fit_at};
+use super::prior::Sizes;
+use crate::arm::Arm;
+use crate::numerics::gram;
+use crate::solver::robust;
+
+/// Folds of configurations.
+const FOLDS: usize = 10;
+/// Sizes from which the readings' choice begins: zeros of several degrees are found, lengths and turns are those of manufacturing.
+const LOOSE: Sizes = Sizes { zeros: 10.0, lengths: 1.0, turns: 1.0 };
+
+/// What is let loose on a rung of the ladder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Freedom {
+    /// Where the arm stands and where the target sits; the arm is nominal.
+    BaseAndTarget,
+    /// And the joints' zeros.
+    Zeros,
+    /// And the positions of the joints: link lengths and offsets.
+    Lengths,
+    /// And their directions: the whole geometry.
+    Geometry,
+}
+
+impl Freedom {
+    /// All, from the bottom up.
+    pub const ALL: [Freedom; 4] = [Freedom::BaseAndTarget, Freedom::Zeros, Freedom::Lengths, Freedom::Geometry];
+
+    /// In words.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Freedom::BaseAndTarget => "base and target",
+            Freedom::Zeros => "+ joint zeros",
+            Freedom::Lengths => "+ link lengths",
+            Freedom::Geometry => "+ twists: full geometry",
+        }
+    }
+
+    /// `sizes` of what is let loose, nothing else.
+    fn of(self, sizes: Sizes) -> Sizes {
+        match self {
+            Freedom::BaseAndTarget => Sizes::NOMINAL,
+            Freedom::Zeros => Sizes { lengths: 0.0, turns: 0.0, ..sizes },
+            Freedom::Lengths => Sizes { turns: 0.0, ..sizes },
+            Freedom::Geometry => sizes,
+        }
+    }
+}
+
+/// A rung, and how good it is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Rung {
+    /// What is let loose.
+    pub free: Freedom,
+    /// RMS distance on readings that were left out, m.
+    pub left_out_m: f64,
+    /// RMS angle on readings that were left out, rad; absent where no orientation was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub left_out_rad: Option<f64>,
+    /// Whether it is the one that counts: the best on readings that were left out.
+    pub chosen: bool,
+}
+
+/// The geometry of the best rung, and all rungs that were tried.
+#[derive(Clone, Debug)]
+pub struct Climbed {
+    /// Fitted on the chosen rung.
+    pub geometry: Geometry,
+    /// From the bottom up.
+    pub rungs: Vec<Rung>,
+}
+
+/// Climbs the ladder. `only`: the highest rung that may be taken, where somebody said so.
+///
+/// # Errors
+/// If the readings cannot tell.
+pub fn climb(arm: &Arm, readings: Readings<'_>, only: Option<Freedom>) -> Result<Climbed, GeometryError> {
+    let loose = fit_at(arm, readings, LOOSE)?;
+    let likeliest = loose.likeliest_sizes();
+    // Rows that are far off for the whole geometry are for every part of it.
+    let counts = loose.equations.counts();
+    let good: Vec<bool> = (0..counts.len()).map(|row| loose.far.get(row).is_none_or(|far| *far >= robust::FAR)).collect();
+    let mut tried: Vec<(Freedom, Geometry, LeftOut)> = Vec::new();
+    for free in Freedom::ALL {
+        if only.is_some_and(|only| only != free) {
+            continue;
+        }
+        let mut geometry = loose.refit(arm, readings, free.of(likeliest))?;
+        if free != Freedom::BaseAndTarget && free != Freedom::Geometry {
+            let sizes = geometry.likeliest_sizes();
+            if sizes != geometry.sizes() {
+                geometry = geometry.refit(arm, readings, sizes)?;
+            }
+        }
+        let left_out = left_out(&geometry, readings, &good);
+        tried.push((free, geometry, left_out));
+    }
+    let best = (0..tried.len()).min_by(|a, b| tried[*a].2.square.total_cmp(&tried[*b].2.square)).unwrap_or(0);
+    let rung = |(at, (free, _, left)): (usize, &(Freedom, Geometry, LeftOut))| Rung {
+        free: *free,
+        left_out_m: left.position_m,
+        left_out_rad: left.rotation_rad,
+        chosen: at == best,
+    };
+    let rungs = tried.iter().enumerate().map(rung).collect();
+    Ok(Climbed { geometry: tried.swap_remove(best).1, rungs })
+}
+
+/// Errors on readings that were left out.
+struct LeftOut {
+    /// Mean square in declared sigmas.
+    square: f64,
+    position_m: f64,
+    rotation_rad: Option<f64>,
+}
+
+/// Errors of `geometry` on readings of configurations that were left out, to first order about the fit of all: without fold k the parameters
+/// change by `-(N - N_k + 1)^-1 J_k' r_k`.
+fn left_out(geometry: &Geometry, readings: Readings<'_>, good: &[bool]) -> LeftOut {
+    let sigma = libm::sqrt(geometry.level);
+    let jacobian = geometry.whitening.of(&geometry.jacobian) / sigma;
+    let residual = geometry.whitening.of_vector(&geometry.residual) / sigma;
+    let mut normal = gram(&jacobian);
+    (0..normal.nrows()).for_each(|at| normal[(at, at)] += 1.0);
+    let fold_of = folds(readings);
+    let equations = &geometry.equations;
+    let (mut square, mut count) = (0.0, 0_usize);
+    let (mut of_position, mut of_rotation, mut rows) = (0.0, 0.0, 0_usize);
+    for fold in 0..FOLDS {
+        let own: Vec<usize> = (0..good.len()).filter(|row| fold_of[*row] == fold).collect();
+        let of_fold: Vec<usize> = own.iter().flat_map(|row| equations.of(*row)).collect();
+        let there = jacobian.select_rows(&of_fold);
+        let without = &normal - gram(&there);
+        let right = there.tr_mul(&residual.select_rows(&of_fold));
+        let change = without.cholesky().map_or_else(|| DVector::zeros(right.len()), |factor| factor.solve(&right));
+        for row in own.into_iter().filter(|row| good[*row]) {
+            rows += 1;
+            for equation in equations.of(row) {
+                let left = geometry.residual[equation] + geometry.jacobian.row(equation).dot(&change.transpose());
+                square += (left / equations.sigmas()[equation].max(1e-9)).powi(2);
+                count += 1;
+                let sum = if equations.component(equation) < 3 { &mut of_position } else { &mut of_rotation };
+                *sum += left * left;
+            }
+        }
+    }
+    let rows = rows.max(1) as f64;
+    LeftOut {
+        square: square / count.max(1) as f64,
+        position_m: libm::sqrt(of_position / rows),
+        rotation_rad: equations.has_orientation().then(|| libm::sqrt(of_rotation / rows)),
+    }
+}
+
+/// A fold for each reading; those of one configuration are in one.
+fn folds(readings: Readings<'_>) -> Vec<usize> {
+    let mut known: std::collections::HashMap<Vec<u64>, usize> = std::collections::HashMap::new();
+    let of = |row: &&crate::measurement::Measurement| -> usize {
+        let key: Vec<u64> = row.joints.iter().map(|value| value.to_bits()).collect();
+        let next = known.len() % FOLDS;
+        *known.entry(key).or_insert(next)
+    };
+    readings.measurements.iter().map(of).collect()
+}
