@@ -152,12 +152,11 @@ fn subject(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Subject
             }
         };
     }
-    let robot = input::robot_of_table(&options.input, &options.robot)?;
-    let (start, real) = input::described("diagnose", robot, &options.robot)?;
-    let mut table = input::read_table(&options.input, &options.robot)?;
-    let (arm, mut notes) = session::real_robot(&start, &real).with_context(|| robot.display().to_string())?;
-    input::check_units(&options.input, &table, &arm)?;
-    input::check_joints(&options.input, &table.measurements, arm.joint_count())?;
+    let input::Front { start, real, arm, mut table, mut notes } = input::front("diagnose", &options.input, &options.robot)?;
+    // An effect is looked for about joints as they stand.
+    for row in &mut table.measurements {
+        row.joints.iter_mut().zip(&real.zeros).for_each(|(value, zero)| *value += zero);
+    }
     let noise = if options.robot.position_noise_um.is_some() { NoiseSource::Declared } else { NoiseSource::Assumed };
     let sensor = session::real_sensor(&real, &table.measurements);
     if table.fill_in_approach() {

@@ -10,8 +10,6 @@ use super::arguments::{Global, IdentifyOptions};
 use super::input;
 use super::output::{self, Audience};
 use crate::arm::Arm;
-use crate::diagnosis::rows::check_robot;
-use crate::diagnosis::settings::Model;
 use crate::event::{self, Event, RealCell, Start};
 use crate::measurement::{Measurement, Role, table};
 use crate::progress::Progress as _;
@@ -26,7 +24,8 @@ fn from_recording(global: &Global, options: &IdentifyOptions) -> anyhow::Result<
     let (start, measurements) = input::recorded(global, &options.input, options.partial)?;
     if let Some(real) = start.real {
         let start = Start { real: Some(real.clone()), ..session::start_event("identify", &start.scene) };
-        return real_cell(global, options, start, &real, &options.input, measurements);
+        let nominal = session::real_robot(&start, &real).with_context(|| options.input.display().to_string())?;
+        return real_cell(global, options, start, &real, nominal, measurements);
     }
     let file = scene::parse(&start.scene, &format!("{} (scene)", options.input.display()))?;
     let scene = &file.scene;
@@ -44,39 +43,30 @@ fn from_recording(global: &Global, options: &IdentifyOptions) -> anyhow::Result<
 }
 
 fn from_table(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outcome> {
-    let robot = input::robot_of_table(&options.input, &options.robot)?;
-    let (start, real) = input::described("identify", robot, &options.robot)?;
-    let table = input::read_table(&options.input, &options.robot)?;
+    let input::Front { start, real, arm, table, notes } = input::front("identify", &options.input, &options.robot)?;
     let unused: Vec<&str> =
         table.conditions.iter().map(String::as_str).filter(|name| !table::TO_IDENTIFY.contains(name)).collect();
     if !unused.is_empty() {
         output::note(global, &format!("note: an identification does not use {}", unused.join(", ")));
     }
-    let (nominal, _) = session::real_robot(&start, &real).with_context(|| robot.display().to_string())?;
-    input::check_units(&options.input, &table, &nominal)?;
-    real_cell(global, options, start, &real, robot, table.measurements)
+    real_cell(global, options, start, &real, (arm, notes), table.measurements)
 }
 
-/// Identifies a real arm. `start` is the first event of the recording, `robot` the file that the nominal arm comes from.
+/// Identifies a real arm. `start` is the first event of the recording, `nominal` the arm and what is to be known of its file.
 fn real_cell(
     global: &Global,
     options: &IdentifyOptions,
     start: Start,
     real: &RealCell,
-    robot: &Path,
+    nominal: (Arm, Vec<String>),
     measurements: Vec<Measurement>,
 ) -> anyhow::Result<Outcome> {
-    let nominal = session::real_robot(&start, real).with_context(|| robot.display().to_string())?;
     let joint_count = nominal.0.joint_count();
     input::check_joints(&options.input, &measurements, joint_count)?;
     let measurements = with_evaluation(measurements, options, &nominal.0)?;
     let real = &RealCell { only: options.only.map(Into::into), ..real.clone() };
     let start = Start { real: Some(real.clone()), ..start };
     let real = session::real_arm(real, nominal, &measurements).with_context(|| options.input.display().to_string())?;
-
-    // Parameters that are free enough explain wrong units, too.
-    let fitted: Vec<&Measurement> = measurements.iter().filter(|row| row.role == Role::Fit).collect();
-    check_robot(&real.arm, &real.sensor, &fitted, &Model::default()).with_context(|| options.input.display().to_string())?;
 
     let stem = input::input_stem(&options.input, "-identified");
     let mut audience = Audience::open(global, &real.arm, None, Some(&stem), &stem)?;

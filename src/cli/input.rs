@@ -8,8 +8,11 @@ use super::arguments::{Global, RobotOptions};
 use super::output;
 use crate::arm::Arm;
 use crate::arm::{JointKind, urdf};
+use crate::diagnosis::rows::check_robot;
+use crate::diagnosis::settings::Model;
 use crate::event::{self, RealCell, Start};
-use crate::measurement::{Measurement, table};
+use crate::identification::mistake::{Fix, Said};
+use crate::measurement::{Measurement, Role, table};
 use crate::{recording, scene, session};
 
 /// Position noise that is assumed where none is declared, µm.
@@ -39,7 +42,7 @@ pub(crate) fn recorded(global: &Global, path: &Path, partial: bool) -> anyhow::R
 }
 
 /// The first event of a table's recording: the robot as its file stands, and the sensor as declared.
-pub(crate) fn described(command: &str, robot: &Path, options: &RobotOptions) -> anyhow::Result<(Start, RealCell)> {
+fn described(command: &str, robot: &Path, options: &RobotOptions) -> anyhow::Result<(Start, RealCell)> {
     let is_scene = robot.extension().is_some_and(|extension| extension == "toml");
     let scene = if is_scene { scene::read(robot)?.public_toml()? } else { String::new() };
     let urdf = if is_scene {
@@ -62,8 +65,62 @@ pub(crate) fn described(command: &str, robot: &Path, options: &RobotOptions) -> 
     Ok((Start { real: Some(real.clone()), ..session::start_event(command, &scene) }, real))
 }
 
+/// A table and the robot that it is of, checked against one another.
+pub(crate) struct Front {
+    /// What a recording of it would begin with.
+    pub(crate) start: Start,
+    /// The robot and the sensor; joints whose zeros are far off are looked for there.
+    pub(crate) real: RealCell,
+    /// The nominal arm.
+    pub(crate) arm: Arm,
+    /// The rows, corrected as the command line says.
+    pub(crate) table: table::Table,
+    /// What is to be known of robot and table.
+    pub(crate) notes: Vec<String>,
+}
+
+/// The one door through which tables come in: reads `path` and its robot, applies the corrections of the command line, and refuses what
+/// cannot be of this robot with what would explain it.
+pub(crate) fn front(command: &str, path: &Path, options: &RobotOptions) -> anyhow::Result<Front> {
+    let robot = robot_of_table(path, options)?;
+    let (start, mut real) = described(command, robot, options)?;
+    let mut table = read_table(path, options)?;
+    let (arm, mut notes) = session::real_robot(&start, &real).with_context(|| robot.display().to_string())?;
+    check_units(path, &table, &arm)?;
+    check_joints(path, &table.measurements, arm.joint_count())?;
+    let slides = arm.slides();
+    let turning = table.joint_factor.iter().zip(&slides).find(|(_, slides)| !**slides);
+    let said = Said { angle: turning.map_or(1.0, |(factor, _)| *factor), position: table.position_factor };
+    for text in &options.fix_columns {
+        let fix: Fix = text.parse().map_err(|wrong| anyhow::anyhow!("--fix-columns {wrong}"))?;
+        fix.apply(&mut table.measurements, &said, &slides).map_err(|wrong| anyhow::anyhow!("--fix-columns {text}: {wrong}"))?;
+        let names: Vec<String> = arm.chain.joints.iter().map(|joint| joint.name.clone()).collect();
+        notes.push(format!("corrected as --fix-columns {text} says: {}", fix.words(&names)));
+    }
+    let fitted: Vec<&Measurement> = table.measurements.iter().filter(|row| row.role == Role::Fit).collect();
+    let sensor = session::real_sensor(&real, &table.measurements);
+    // Parameters that are free enough explain wrong units, too.
+    match check_robot(&arm, &sensor, &fitted, &Model::default(), &said) {
+        Ok(()) => {}
+        Err(wrong) => match wrong.explanations() {
+            [only] if only.is_of_zeros() => {
+                real.zeros = vec![0.0; slides.len()];
+                for fix in &only.fixes {
+                    if let Fix::Zero(joint, zero) = fix {
+                        real.zeros[*joint] += zero;
+                    }
+                }
+                notes.push(format!("{}: its zero is looked for there", only.words(&arm)));
+            }
+            _ => return Err(wrong).with_context(|| path.display().to_string()),
+        },
+    }
+    let start = Start { real: Some(real.clone()), ..start };
+    Ok(Front { start, real, arm, table, notes })
+}
+
 /// Reads the table of `input`, with gravity as it was said on the command line.
-pub(crate) fn read_table(path: &Path, options: &RobotOptions) -> anyhow::Result<table::Table> {
+fn read_table(path: &Path, options: &RobotOptions) -> anyhow::Result<table::Table> {
     let mut table = table::read(path)?;
     if !options.gravity.is_empty() {
         let said = options.gravity.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
@@ -115,6 +172,7 @@ pub(crate) fn no_links(options: &RobotOptions, why: &str) -> anyhow::Result<()> 
 pub(crate) fn no_robot(options: &RobotOptions) -> anyhow::Result<()> {
     no_links(options, "a recording carries its own nominal arm; leave it out")?;
     ensure!(options.gravity.is_empty(), "--gravity: a recording has its own; leave it out");
+    ensure!(options.fix_columns.is_empty(), "--fix-columns: a recording has been corrected already; leave it out");
     ensure!(
         options.robot.is_none(),
         "--robot {}: a recording carries its own nominal arm; give --robot with a table (.csv) only",
@@ -124,7 +182,7 @@ pub(crate) fn no_robot(options: &RobotOptions) -> anyhow::Result<()> {
 }
 
 /// The nominal robot of a table.
-pub(crate) fn robot_of_table<'a>(input: &Path, options: &'a RobotOptions) -> anyhow::Result<&'a Path> {
+fn robot_of_table<'a>(input: &Path, options: &'a RobotOptions) -> anyhow::Result<&'a Path> {
     let Some(robot) = &options.robot else {
         bail!("{} is a table: give its nominal robot with --robot FILE (a URDF or a scene)", input.display());
     };

@@ -23,7 +23,6 @@ pub(crate) mod held_out;
 mod linear;
 mod magnitude;
 mod misfit;
-mod mistake;
 mod naming;
 mod notes;
 mod open_set;
@@ -57,6 +56,7 @@ use crate::arm::Arm;
 use crate::effects::signature::library::{Hypothesis, library, ripple, strongest};
 use crate::effects::signature::shape::Displacement;
 use crate::effects::{Kind, Location};
+use crate::identification::mistake::Said;
 use crate::identification::geometry::GeometryError;
 use crate::measurement::{Measurement, Sensor};
 use candidates::{candidates, weigh};
@@ -196,7 +196,7 @@ impl State {
     fn robust(data: &Data<'_>) -> Result<State, DiagnosisError> {
         let state = State::nominal(data);
         let rows::First { far, calibrated } =
-            rows::first_fit(data.arm, data.sensor, data.measurements, &data.options.settings.model)?;
+            rows::first_fit(data.arm, data.sensor, data.measurements, &data.options.settings.model, &Said::default())?;
         Ok(State { far: if far.is_empty() { state.far } else { far }, calibrated, ..state })
     }
 

@@ -5,13 +5,13 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::mistake;
 use super::scatter::Scatter;
 use super::settings::Model;
 use crate::arm::Arm;
 use crate::effects::signature::posture::{Mechanism, Posture};
 use crate::effects::signature::shape::Displacement;
 use crate::identification::geometry::{self, GeometryError};
+use crate::identification::mistake::{self, Explanation, Said};
 use crate::measurement::equations::Equations;
 use crate::measurement::{Measurement, Sensor};
 use crate::solver::robust;
@@ -27,12 +27,19 @@ pub enum DiagnosisError {
     #[error(transparent)]
     Setting(#[from] super::settings::NotAllowed),
     /// The fit went astray.
-    #[error("no arm of this kind makes these readings: with base, target and geometry fitted, {rms_mm:.0} mm RMS remain. {hint}")]
+    #[error(
+        "no arm of this kind makes these readings: with base, target and geometry fitted, {rms_mm:.0} mm{} RMS remain. {hint}",
+        of_turns(*turn_deg)
+    )]
     NotThisRobot {
         /// Remaining, mm.
         rms_mm: f64,
+        /// Remaining of orientations, degrees; zero where none was measured.
+        turn_deg: f64,
         /// What would fit, if anything simple does.
         hint: String,
+        /// The same for machines.
+        explanations: Vec<Explanation>,
     },
     /// The fit bent the arm out of shape.
     #[error(
@@ -46,7 +53,24 @@ pub enum DiagnosisError {
         turn_deg: f64,
         /// What would fit, if anything simple does.
         hint: String,
+        /// The same for machines.
+        explanations: Vec<Explanation>,
     },
+}
+
+impl DiagnosisError {
+    /// What would make the readings those of the robot.
+    #[must_use]
+    pub fn explanations(&self) -> &[Explanation] {
+        match self {
+            DiagnosisError::NotThisRobot { explanations, .. } | DiagnosisError::NotThisGeometry { explanations, .. } => explanations,
+            _ => &[],
+        }
+    }
+}
+
+fn of_turns(degrees: f64) -> String {
+    if degrees > 0.0 { format!(" and {degrees:.1}°") } else { String::new() }
 }
 
 /// The fitted geometry and what it leaves.
@@ -135,12 +159,18 @@ pub(crate) struct Readings<'a> {
     pub(crate) scatter: &'a [Scatter],
 }
 
-/// Whether `measurements` can be of `arm` at all, as its file and the table's units say.
+/// Whether `measurements` can be of `arm` at all, as its file and the table's units (`said`) say.
 ///
 /// # Errors
 /// If not: with what would explain it. Measurements that tell too little are no error here.
-pub fn check_robot(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement], settings: &Model) -> Result<(), DiagnosisError> {
-    match first_fit(arm, sensor, measurements, settings) {
+pub fn check_robot(
+    arm: &Arm,
+    sensor: &Sensor,
+    measurements: &[&Measurement],
+    settings: &Model,
+    said: &Said,
+) -> Result<(), DiagnosisError> {
+    match first_fit(arm, sensor, measurements, settings, said) {
         Ok(_) | Err(DiagnosisError::Geometry(_)) => Ok(()),
         Err(wrong) => Err(wrong),
     }
@@ -164,6 +194,7 @@ pub(crate) fn first_fit(
     sensor: &Sensor,
     measurements: &[&Measurement],
     settings: &Model,
+    said: &Said,
 ) -> Result<First, DiagnosisError> {
     let weights = vec![1.0; measurements.len()];
     let readings = geometry::Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[], zeros: &[] };
@@ -182,15 +213,21 @@ pub(crate) fn first_fit(
         (0..equations.readings()).collect()
     };
     let rms = libm::sqrt(counted.iter().map(|row| of_position(*row)).sum::<f64>() / counted.len() as f64);
-    if rms.is_nan() || rms >= settings.astray * reach.max(settings.small_arm_m) {
-        return Err(DiagnosisError::NotThisRobot { rms_mm: rms * 1e3, hint: mistake::hint(arm, measurements, settings.mended) });
+    let of_all = |row: usize| rows.residual.rows_range(equations.of(row)).norm_squared();
+    let turns = counted.iter().map(|row| of_all(*row) - of_position(*row)).sum::<f64>().max(0.0);
+    let turn_rad = libm::sqrt(turns / counted.len() as f64);
+    if turn_rad > settings.astray_rad || rms.is_nan() || rms >= settings.astray * reach.max(settings.small_arm_m) {
+        let (hint, explanations) = mistake::hint(arm, said, measurements);
+        return Err(DiagnosisError::NotThisRobot { rms_mm: rms * 1e3, turn_deg: turn_rad.to_degrees(), hint, explanations });
     }
     if rows.parameters.amax() > settings.implausible {
         let [shift, turn] = rows.largest_errors;
+        let (hint, explanations) = mistake::hint(arm, said, measurements);
         return Err(DiagnosisError::NotThisGeometry {
             shift_mm: shift * 1e3,
             turn_deg: turn.to_degrees(),
-            hint: mistake::hint(arm, measurements, settings.mended),
+            hint,
+            explanations,
         });
     }
     Ok(First { far: rows.far, calibrated: geometry::shrunk_residual(arm, readings, &loose)? })
@@ -272,7 +309,7 @@ mod tests {
     fn another_unit_is_no_arm_of_this_kind_and_a_few_wild_readings_are() {
         let settings = &Settings::default().model;
         let (arm, mut rows) = readings("test/robot", |_, _, _, _, _| 0.0);
-        let check = |rows: &[Measurement]| check_robot(&arm, &sensor(), &rows.iter().collect::<Vec<_>>(), settings);
+        let check = |rows: &[Measurement]| check_robot(&arm, &sensor(), &rows.iter().collect::<Vec<_>>(), settings, &Said::default());
         rows[7].position_m[0] += 3.0;
         rows[30].position_m[2] -= 5.0;
         assert!(check(&rows).is_ok());

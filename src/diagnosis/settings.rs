@@ -210,8 +210,8 @@ settings! {
         temperature_k: f64 = 0.05 => 0.0..=100.0,
         /// Reach below which an arm counts as one of this reach there, m.
         small_arm_m: f64 = 0.1 => 1e-6..=MANY,
-        /// Share of a misfit that may be left where a mistake in the table (units, senses, swapped columns) is said to explain it.
-        mended: f64 = 0.2 => SHARE,
+        /// What remains of orientations (RMS, rad) beyond which it is another robot.
+        astray_rad: f64 = 0.1 => 1e-6..=MANY,
     }
 
     /// What is likely before any reading is looked at.

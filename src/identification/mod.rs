@@ -5,6 +5,7 @@ pub mod frames;
 pub mod geometry;
 pub mod ladder;
 pub mod least_squares;
+pub mod mistake;
 pub mod outcome;
 pub mod prior;
 pub mod real;

@@ -17,6 +17,10 @@ pub struct Table {
     pub measurements: Vec<Measurement>,
     /// Of each joint column, whether its unit is a length.
     pub joint_is_length: Vec<bool>,
+    /// What the numbers of joints that turn were multiplied by, rad per unit; of those that slide, m per unit.
+    pub joint_factor: Vec<f64>,
+    /// The same of positions, m per unit.
+    pub position_factor: [f64; 3],
     /// Columns of conditions: an identification uses [`TO_IDENTIFY`] of them, a diagnosis all.
     pub conditions: Vec<String>,
     /// Whether the order of measuring is known: that of the rows, or of their times.
@@ -271,9 +275,14 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
     let conditions =
         header.iter().zip(&columns).filter(|(_, column)| is_condition(column)).map(|(name, _)| name.to_owned()).collect();
     let mut joint_is_length = vec![false; layout.joints];
+    let (mut joint_factor, mut position_factor) = (vec![1.0; layout.joints], [1.0; 3]);
     for column in &columns {
-        if let Column::Joint { joint, is_length, .. } = column {
-            joint_is_length[*joint] = *is_length;
+        match column {
+            Column::Joint { joint, is_length, factor } => {
+                (joint_is_length[*joint], joint_factor[*joint]) = (*is_length, *factor);
+            }
+            Column::Position { axis, factor } => position_factor[*axis] = *factor,
+            _ => {}
         }
     }
     let is_unknown = |line: &str| {
@@ -281,7 +290,7 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
         said.is_some_and(|said| said == "order:unknown")
     };
     let in_order = !text.lines().any(is_unknown);
-    Ok(Table { measurements, joint_is_length, conditions, in_order })
+    Ok(Table { measurements, joint_is_length, joint_factor, position_factor, conditions, in_order })
 }
 
 fn not_negative(value: f64) -> Result<f64, String> {
