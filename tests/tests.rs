@@ -27,6 +27,8 @@ mod kinematics;
 mod layering;
 #[path = "integration/measure.rs"]
 mod measure;
+#[path = "integration/mistakes.rs"]
+mod mistakes;
 #[path = "integration/real_data.rs"]
 mod real_data;
 #[path = "integration/replay.rs"]

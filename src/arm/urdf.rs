@@ -6,6 +6,7 @@
 mod export;
 mod import;
 mod locate;
+mod rewrite;
 pub(crate) mod rpy;
 #[cfg(test)]
 mod tests;
@@ -15,6 +16,7 @@ use std::path::PathBuf;
 
 pub use export::{export, export_with};
 pub use import::{Imported, import, read};
+pub use rewrite::{Added, Change, rewrite};
 
 /// Why a URDF could not be read or written.
 #[derive(Debug, thiserror::Error)]

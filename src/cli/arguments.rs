@@ -373,6 +373,9 @@ pub(crate) struct IdentifyOptions {
     /// What alone is to be let loose of a real arm beside its base and target [default: what predicts readings best that are left out]
     #[arg(long, value_enum)]
     pub(crate) only: Option<Only>,
+    /// Add the measurement frame and the target to the calibrated URDF, as links with fixed joints
+    #[arg(long)]
+    pub(crate) with_frames: bool,
     /// Use a recording that was cut off, up to the cut
     #[arg(long)]
     pub(crate) partial: bool,

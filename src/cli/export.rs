@@ -90,9 +90,9 @@ fn from_recording(global: &Global, options: &ExportOptions) -> anyhow::Result<(&
             let arm = &arm()?;
             let text = match identified {
                 Some(identification) => {
-                    let values: Vec<f64> = identification.parameters.iter().map(|parameter| parameter.identified).collect();
+                    let own = start.real.as_ref().and_then(|real| real.urdf.as_deref());
                     // The nominal arm may lie beside the recording, under its name.
-                    return Ok(("calibrated.urdf", urdf::export_with(arm, &values)?));
+                    return Ok(("calibrated.urdf", output::calibrated(arm, own, false, identification)?));
                 }
                 None => {
                     output::note(global, "note: the recording holds no identification; this is the nominal arm");

@@ -39,7 +39,7 @@ fn from_recording(global: &Global, options: &IdentifyOptions) -> anyhow::Result<
     }
     let identification = session::identify_and_tell(scene, &measurements, &mut audience)?;
     let recording = audience.finish()?;
-    conclude(global, options, &scene.arm, &identification, recording.as_deref(), &stem)
+    conclude(global, options, &scene.arm, None, &identification, recording.as_deref(), &stem)
 }
 
 fn from_table(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outcome> {
@@ -66,6 +66,7 @@ fn real_cell(
     let measurements = with_evaluation(measurements, options, &nominal.0)?;
     let real = &RealCell { only: options.only.map(Into::into), ..real.clone() };
     let start = Start { real: Some(real.clone()), ..start };
+    let own = real.urdf.clone();
     let real = session::real_arm(real, nominal, &measurements).with_context(|| options.input.display().to_string())?;
 
     let stem = input::input_stem(&options.input, "-identified");
@@ -76,18 +77,20 @@ fn real_cell(
     }
     let identification = session::identify_real(&real, &measurements, &mut audience)?;
     let recording = audience.finish()?;
-    conclude(global, options, &real.arm, &identification, recording.as_deref(), &stem)
+    conclude(global, options, &real.arm, own.as_deref(), &identification, recording.as_deref(), &stem)
 }
 
 fn conclude(
     global: &Global,
     options: &IdentifyOptions,
     arm: &Arm,
+    own: Option<&str>,
     identification: &crate::identification::outcome::Identification,
     recording: Option<&Path>,
     stem: &str,
 ) -> anyhow::Result<Outcome> {
-    let path = output::write_calibrated(global.out.join(format!("{stem}.urdf")), arm, identification)?;
+    let path = global.out.join(format!("{stem}.urdf"));
+    let path = output::write_calibrated(path, arm, own, options.with_frames, identification)?;
     output::show(global, &report::identification(identification))?;
     if options.parameters {
         if !identification.joint_frames.is_empty() {

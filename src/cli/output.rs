@@ -8,7 +8,7 @@ use anyhow::{Context, bail, ensure};
 use super::Outcome;
 use super::arguments::{Global, SceneOptions};
 use super::bar::Bar;
-use crate::arm::Arm;
+use crate::arm::{Arm, urdf};
 use crate::design::problem::DesignProblem;
 use crate::event::Event;
 use crate::identification::outcome::Identification;
@@ -131,16 +131,56 @@ pub(crate) fn write(path: &Path, text: &str) -> anyhow::Result<()> {
 
 /// Writes the calibrated arm to `path` as URDF; the path, and `None` where the fit did not converge: an arm that is none must not be
 /// found there, not even that of an earlier run.
-pub(crate) fn write_calibrated(path: PathBuf, arm: &Arm, identification: &Identification) -> anyhow::Result<Option<PathBuf>> {
+///
+/// Where the arm came from the URDF `own`, that is what is written, with new origins and nothing else changed; `frames` adds the measurement
+/// frame and the target to it.
+pub(crate) fn write_calibrated(
+    path: PathBuf,
+    arm: &Arm,
+    own: Option<&str>,
+    frames: bool,
+    identification: &Identification,
+) -> anyhow::Result<Option<PathBuf>> {
     if !identification.converged {
         if path.exists() {
             std::fs::remove_file(&path).with_context(|| format!("cannot remove {}", path.display()))?;
         }
         return Ok(None);
     }
-    let values: Vec<f64> = identification.parameters.iter().map(|parameter| parameter.identified).collect();
-    write(&path, &crate::arm::urdf::export_with(arm, &values)?)?;
+    write(&path, &calibrated(arm, own, frames, identification)?)?;
     Ok(Some(path))
+}
+
+/// The calibrated arm as URDF; see [`write_calibrated`].
+pub(crate) fn calibrated(arm: &Arm, own: Option<&str>, frames: bool, identification: &Identification) -> anyhow::Result<String> {
+    let values: Vec<f64> = identification.parameters.iter().map(|parameter| parameter.identified).collect();
+    let added = if frames { added(arm, &values) } else { Vec::new() };
+    let rewritten = own.map(|text| urdf::rewrite(text, arm, &values, &added)).transpose()?.flatten();
+    match rewritten {
+        Some((text, _)) => Ok(text),
+        None => Ok(urdf::export_with(arm, &values)?),
+    }
+}
+
+/// The measurement frame before the robot's root, and the target behind its tip. `arm` is the arm in the measurement frame: its first frame
+/// is that, its last one the target.
+fn added(arm: &Arm, values: &[f64]) -> Vec<urdf::Added> {
+    let names = arm.chain.frame_names();
+    let [measurement, root, .., tip, target] = names.as_slice() else {
+        return Vec::new();
+    };
+    let six = |first: usize| {
+        let [x, y, z, yaw, pitch, roll] = std::array::from_fn(|at| values[first + at]);
+        [x, y, z, roll, pitch, yaw]
+    };
+    let last = values.len() - 6;
+    let new = |parent: &str, child: &str, first: usize, new_link: &str| urdf::Added {
+        parent: parent.to_owned(),
+        child: child.to_owned(),
+        origin: six(first),
+        new_link: new_link.to_owned(),
+    };
+    vec![new(measurement, root, 0, measurement), new(tip, target, last, target)]
 }
 
 /// What to print of a path that may not have been written.

@@ -31,7 +31,7 @@ pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result
     let recording = audience.finish()?;
 
     output::write(&urdf_path, &urdf_text)?;
-    let calibrated_path = output::write_calibrated(calibrated_path, &scene.arm, &run.identification)?;
+    let calibrated_path = output::write_calibrated(calibrated_path, &scene.arm, None, false, &run.identification)?;
 
     let parameter_count = scene.arm.chain.parameters.len();
     output::show(global, &format!("{}: {}\n{}\n", scene.name, scene.description, scene.arm_note))?;

@@ -195,7 +195,7 @@ impl State {
     /// Nothing found; rows that are far off from what geometry makes of the others count little, as what they pull awry hides all else.
     fn robust(data: &Data<'_>) -> Result<State, DiagnosisError> {
         let state = State::nominal(data);
-        let rows::First { far, calibrated } =
+        let rows::First { far, calibrated, .. } =
             rows::first_fit(data.arm, data.sensor, data.measurements, &data.options.settings.model, &Said::default())?;
         Ok(State { far: if far.is_empty() { state.far } else { far }, calibrated, ..state })
     }

@@ -11,7 +11,7 @@ use crate::arm::Arm;
 use crate::effects::signature::posture::{Mechanism, Posture};
 use crate::effects::signature::shape::Displacement;
 use crate::identification::geometry::{self, GeometryError};
-use crate::identification::mistake::{self, Explanation, Said};
+use crate::identification::mistake::{self, Explanation, Fix, Said};
 use crate::measurement::equations::Equations;
 use crate::measurement::{Measurement, Sensor};
 use crate::solver::robust;
@@ -170,11 +170,29 @@ pub fn check_robot(
     settings: &Model,
     said: &Said,
 ) -> Result<(), DiagnosisError> {
-    match first_fit(arm, sensor, measurements, settings, said) {
-        Ok(_) | Err(DiagnosisError::Geometry(_)) => Ok(()),
-        Err(wrong) => Err(wrong),
+    let first = match first_fit(arm, sensor, measurements, settings, said) {
+        Ok(first) => first,
+        Err(DiagnosisError::Geometry(_)) => return Ok(()),
+        Err(wrong) => return Err(wrong),
+    };
+    // A geometry that is free enough bends itself to wrong columns: where the nominal arm is far off, a mistake may fit better.
+    let corrected = |fixes: &[Fix]| -> Option<f64> {
+        let mut rows: Vec<Measurement> = measurements.iter().map(|row| (*row).clone()).collect();
+        fixes.iter().try_for_each(|fix| fix.apply(&mut rows, said, &arm.slides())).ok()?;
+        Some(first_fit(arm, sensor, &rows.iter().collect::<Vec<_>>(), settings, said).ok()?.rms_m)
+    };
+    if mistake::is_suspicious(arm, measurements) {
+        let (hint, explanations) = mistake::hint(arm, said, measurements);
+        let best = explanations.iter().filter_map(|found| corrected(&found.fixes)).fold(f64::INFINITY, f64::min);
+        if best < FITS_BETTER * first.rms_m {
+            return Err(DiagnosisError::NotThisRobot { rms_mm: first.rms_m * 1e3, turn_deg: first.turn_rad.to_degrees(), hint, explanations });
+        }
     }
+    Ok(())
 }
+
+/// A corrected table is taken for the right one where a calibration leaves so much less of it.
+const FITS_BETTER: f64 = 0.5;
 
 /// What geometry alone makes of readings.
 pub(crate) struct First {
@@ -182,6 +200,9 @@ pub(crate) struct First {
     pub(crate) far: Vec<f64>,
     /// What a calibration leaves ([`crate::identification::identify_real`]), m and rad.
     pub(crate) calibrated: DVector<f64>,
+    /// What geometry leaves of readings that are not far off (RMS): of positions, m, and of orientations, rad.
+    rms_m: f64,
+    turn_rad: f64,
 }
 
 /// Fits `arm` alone to `measurements`, and refuses those that are none of its. What effects and geometry do together later is no reason to
@@ -230,7 +251,7 @@ pub(crate) fn first_fit(
             explanations,
         });
     }
-    Ok(First { far: rows.far, calibrated: geometry::shrunk_residual(arm, readings, &loose)? })
+    Ok(First { far: rows.far, calibrated: geometry::shrunk_residual(arm, readings, &loose)?, rms_m: rms, turn_rad })
 }
 
 /// Fits base, target and geometry of `arm` to `readings`. Sessions get bases of their own where that is worth it.

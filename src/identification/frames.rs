@@ -12,6 +12,8 @@ use crate::arm::{Arm, Axis, JointKind, Step};
 
 /// Step of numerical derivatives of a pose's six parameters, m and rad.
 const STEP: f64 = 1e-6;
+/// A change of a parameter that is nothing, m or rad.
+const ROUNDING: f64 = 1e-13;
 /// A derivative of roll or yaw beyond which they say nothing of their own: near a pitch of a quarter turn only both together do.
 const LOCKED: f64 = 1e3;
 
@@ -155,7 +157,9 @@ fn near(pose: &Pose, wanted: &[f64; 6]) -> [f64; 6] {
         forms.push(form(kept, pitch, roll + sign * (kept - yaw)));
     }
     let away = |form: &[f64; 6]| (3..6).map(|at| (form[at] - wanted[at]).powi(2)).sum::<f64>();
-    forms.into_iter().min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or([x, y, z, yaw, pitch, roll])
+    let nearest = forms.into_iter().min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or([x, y, z, yaw, pitch, roll]);
+    // What only rounding changes stays as it was written.
+    std::array::from_fn(|at| if (nearest[at] - wanted[at]).abs() < ROUNDING { wanted[at] } else { nearest[at] })
 }
 
 #[cfg(test)]

@@ -210,7 +210,7 @@ fn angles(steps: &[&Step], values: &[f64]) -> Option<[f64; 3]> {
     Some(rpy)
 }
 
-fn escaped(name: &str) -> String {
+pub(super) fn escaped(name: &str) -> String {
     name.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

@@ -147,6 +147,14 @@ pub fn explanations(arm: &Arm, said: &Said, rows: &[&Measurement]) -> Vec<Explan
     Vec::new()
 }
 
+/// Whether the nominal arm, base and target placed, leaves more of `rows` than an arm of this kind may.
+#[must_use]
+pub fn is_suspicious(arm: &Arm, rows: &[&Measurement]) -> bool {
+    let search = Search { chain: arm.chain.at_nominal(), slides: arm.slides(), said: &Said::default() };
+    let all: Vec<Measurement> = rows.iter().map(|row| (*row).clone()).collect();
+    search.left(&Read::of(&all)).share >= EXPLAINED
+}
+
 /// The best of `trials`, each set of mistakes once.
 fn best_of(mut trials: Vec<Trial>, most: usize) -> Vec<Trial> {
     trials.sort_by(|a, b| a.left.share.total_cmp(&b.left.share));
