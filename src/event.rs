@@ -2,6 +2,7 @@
 //! nothing that computes knows of them: steps report what they do ([`Progress`]), the session tells it as events.
 
 use crate::identification::ladder::Freedom;
+use crate::measurement::Distance;
 use crate::design::outcome::{DesignOutcome, SearchStep, SwarmIteration};
 use crate::diagnosis::outcome::Diagnosis;
 use crate::identification::outcome::Identification;
@@ -85,6 +86,9 @@ pub struct RealCell {
     /// Where each joint's zero is looked for, rad or m; empty for nominal.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub zeros: Vec<f64>,
+    /// Known distances of fixed points.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub distances: Vec<Distance>,
 }
 
 /// Whoever listens to a run: takes its events in order.

@@ -191,7 +191,8 @@ pub fn real_robot(start: &Start, real: &RealCell) -> Result<(Arm, Vec<String>), 
 #[must_use]
 pub fn real_sensor(real: &RealCell, measurements: &[Measurement]) -> Sensor {
     let orientation = measurements.iter().all(|measurement| measurement.orientation_xyzw.is_some());
-    Sensor::uniform(real.position_sigma_m, orientation.then_some(real.orientation_sigma_rad))
+    let sensor = Sensor::uniform(real.position_sigma_m, orientation.then_some(real.orientation_sigma_rad));
+    Sensor { distances: real.distances.clone(), ..sensor }
 }
 
 /// Places the nominal robot `robot` in the measurement frame of `measurements`.

@@ -305,6 +305,9 @@ pub(crate) struct RobotOptions {
     /// Declared orientation noise of a table's sensor, one sigma per axis [default: 0.005]
     #[arg(long = "attitude-noise-deg", value_name = "DEG", allow_negative_numbers = true)]
     pub(crate) orientation_noise_deg: Option<f64>,
+    /// Known distances of fixed points: point_a,point_b,distance_mm,sigma_mm
+    #[arg(long, value_name = "FILE")]
+    pub(crate) distances: Option<PathBuf>,
     /// Correct what a table got wrong, such as order:1,2,4,5,3,6, reverse:2,5, zero:3=90, positions:inch, axes:x,-y,z, quaternion:wxyz or
     /// shift:31=+2; in the order given, may be given again
     #[arg(long, value_name = "WHAT:HOW", allow_hyphen_values = true)]

@@ -61,6 +61,7 @@ fn described(command: &str, robot: &Path, options: &RobotOptions) -> anyhow::Res
         orientation_sigma_rad: options.orientation_noise_deg.unwrap_or(ORIENTATION_NOISE_DEG).to_radians(),
         only: None,
         zeros: Vec::new(),
+        distances: options.distances.as_ref().map(table::read_distances).transpose()?.unwrap_or_default(),
     };
     Ok((Start { real: Some(real.clone()), ..session::start_event(command, &scene) }, real))
 }
@@ -88,6 +89,16 @@ pub(crate) fn front(command: &str, path: &Path, options: &RobotOptions) -> anyho
     let (arm, mut notes) = session::real_robot(&start, &real).with_context(|| robot.display().to_string())?;
     check_units(path, &table, &arm)?;
     check_joints(path, &table.measurements, arm.joint_count())?;
+    for distance in &real.distances {
+        for label in [&distance.point_a, &distance.point_b] {
+            ensure!(
+                table.measurements.iter().any(|row| row.fixed_point.as_ref() == Some(label)),
+                "{}: `{label}` is no fixed_point of {}",
+                options.distances.as_deref().unwrap_or(path).display(),
+                path.display()
+            );
+        }
+    }
     let slides = arm.slides();
     let turning = table.joint_factor.iter().zip(&slides).find(|(_, slides)| !**slides);
     let said = Said { angle: turning.map_or(1.0, |(factor, _)| *factor), position: table.position_factor };
@@ -172,6 +183,7 @@ pub(crate) fn no_links(options: &RobotOptions, why: &str) -> anyhow::Result<()> 
 pub(crate) fn no_robot(options: &RobotOptions) -> anyhow::Result<()> {
     no_links(options, "a recording carries its own nominal arm; leave it out")?;
     ensure!(options.gravity.is_empty(), "--gravity: a recording has its own; leave it out");
+    ensure!(options.distances.is_none(), "--distances: a recording has its own; leave it out");
     ensure!(options.fix_columns.is_empty(), "--fix-columns: a recording has been corrected already; leave it out");
     ensure!(
         options.robot.is_none(),

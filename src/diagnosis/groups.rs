@@ -296,6 +296,7 @@ mod tests {
             position_sigma_per_m: 0.0,
             orientation_sigma_rad: None,
             temperature_sigma_k: None,
+            distances: Vec::new(),
             view: None,
         };
         let equations = Equations::new(&sensor, &rows);

@@ -76,7 +76,9 @@ pub fn parameters(aligned: &Arm, geometry: &Geometry, covariance: &DMatrix<f64>)
         }
     };
     let base = geometry.measurement_from_root()[0];
-    put(0, &|change| base * FrameErrors::pose(change), 0, per_frame);
+    if geometry.is_placed() {
+        put(0, &|change| base * FrameErrors::pose(change), 0, per_frame);
+    }
     for (joint, origin) in origins.iter().enumerate().skip(1) {
         let own = &frame_errors[per_frame * (joint - 1)..per_frame * joint];
         if own.iter().all(|error| *error == 0.0) {
@@ -92,8 +94,7 @@ pub fn parameters(aligned: &Arm, geometry: &Geometry, covariance: &DMatrix<f64>)
     }
     let target = geometry.tool_from_target()[0];
     let first_of_target = geometry.first_of_frames() + frame_errors.len();
-    let seen = (geometry.free.len() - first_of_target) / geometry.targets.len();
-    put(nominal.len() - per_frame, &|change| target * FrameErrors::pose(change), first_of_target, seen);
+    put(nominal.len() - per_frame, &|change| target * FrameErrors::pose(change), first_of_target, geometry.per_target());
     Some((values, errors))
 }
 

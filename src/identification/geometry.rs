@@ -8,12 +8,12 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::least_squares::{difference, turn_to_residual};
 use super::prior::{Evidence, Sizes};
-use super::standing::stand;
+use super::standing::{Standing, stand};
 use crate::arm::chain::FrameErrors;
 use crate::arm::frames::{Pose, pose_from_parts, registration, rotation_from_vector, rotation_vector};
 use crate::arm::{Arm, ChainAt};
 use crate::measurement::equations::{COMPONENTS, Equations};
-use crate::measurement::{Measurement, Sensor};
+use crate::measurement::{Distance, Measurement, Sensor};
 use crate::numerics::gram;
 use crate::solver::whitening::Whitening;
 use crate::solver::{Fit, Linearised, Problem, Stop, robust, solve};
@@ -94,6 +94,10 @@ pub struct Geometry {
     pub sessions: Vec<String>,
     /// Names of the targets.
     pub targets: Vec<String>,
+    /// Names of the fixed points.
+    pub points: Vec<String>,
+    /// What known distances of fixed points say: whitened residuals, and what one prior sigma of each parameter does to them.
+    distances: (DVector<f64>, DMatrix<f64>),
     /// Session of each row.
     pub session: Vec<usize>,
     /// Target of each row.
@@ -120,6 +124,8 @@ pub struct Geometry {
     pub steps: usize,
     /// What is worth knowing about the sessions.
     pub notes: Vec<String>,
+    /// Whether some reading is in the measurement frame.
+    placed_in_frame: bool,
 }
 
 impl Geometry {
@@ -135,11 +141,12 @@ impl Geometry {
         let sigma = libm::sqrt(self.level);
         let residual = self.whitening.of_vector(&self.residual) / sigma;
         let jacobian = self.whitening.of(&self.jacobian) / sigma;
+        let (of_distances, by_distances) = &self.distances;
         let evidence = Evidence {
-            normal: gram(&jacobian),
-            with_residual: jacobian.tr_mul(&residual),
-            square: residual.norm_squared(),
-            equations: residual.len(),
+            normal: gram(&jacobian) + gram(by_distances),
+            with_residual: jacobian.tr_mul(&residual) + by_distances.tr_mul(of_distances),
+            square: residual.norm_squared() + of_distances.norm_squared(),
+            equations: residual.len() + of_distances.len(),
             parameters: &self.placed.parameters,
             free: &self.free,
             group: Evidence::groups(&self.frames, self.placed.before, &self.free),
@@ -180,7 +187,50 @@ impl Geometry {
         };
         let (session, target) = (number(&self.sessions, &measurement.session), number(&self.targets, &measurement.target));
         let base = &self.placed.measurement_from_root[session];
-        self.frames.at(base, &self.placed.errors(&self.frames), &self.placed.tool_from_target[target]).forward(&measurement.joints)
+        let arm = self.frames.at(base, &self.placed.errors(&self.frames), &self.placed.tool_from_target[target]);
+        let mut pose = arm.forward(&measurement.joints);
+        if let Some(label) = &measurement.fixed_point {
+            let point = self.points.iter().position(|known| known == label);
+            pose.translation.vector -= point.map_or(Vector3::zeros(), |point| self.placed.points[point]);
+        }
+        pose
+    }
+
+    /// Where the fixed points are in the measurement frame, m.
+    #[must_use]
+    pub fn fixed_points(&self) -> &[Vector3<f64>] {
+        &self.placed.points
+    }
+
+    /// With the fixed points of `measurements` that were not fitted, each in the middle of where the arm says that its readings are.
+    #[must_use]
+    pub fn with_points_of(mut self, measurements: &[Measurement]) -> Geometry {
+        let fitted = self.points.len();
+        let labels: Vec<&String> = measurements.iter().filter_map(|row| row.fixed_point.as_ref()).collect();
+        for label in labels {
+            if self.points.contains(label) {
+                continue;
+            }
+            // Where a point is not known, predictions are in the measurement frame.
+            let own = measurements.iter().filter(|row| row.fixed_point.as_ref() == Some(label));
+            let (sum, count) = own.fold((Vector3::zeros(), 0.0), |(sum, count), row| (sum + self.predict(row).translation.vector, count + 1.0));
+            self.points.push(label.clone());
+            self.placed.points.push(sum / count);
+        }
+        debug_assert!(self.points.len() >= fitted);
+        self
+    }
+
+    /// Parameters of a target.
+    #[must_use]
+    pub fn per_target(&self) -> usize {
+        if self.equations.has_orientation() { 6 } else { 3 }
+    }
+
+    /// Whether some reading is in the measurement frame, so that it can be told where the arm stands in it.
+    #[must_use]
+    pub fn is_placed(&self) -> bool {
+        self.placed_in_frame
     }
 
     /// Largest error of a frame along an axis (m) and about one (rad).
@@ -218,7 +268,12 @@ pub fn shrunk_residual(arm: &Arm, readings: Readings<'_>, loose: &Geometry) -> R
 /// # Errors
 /// As [`fit`].
 pub fn fit_at(arm: &Arm, readings: Readings<'_>, sizes: Sizes) -> Result<Geometry, GeometryError> {
-    let (names, session) = numbered(readings.measurements, |row| row.session.as_deref());
+    let (mut names, mut session) = numbered(readings.measurements, |row| row.session.as_deref());
+    if readings.measurements.iter().all(|row| row.fixed_point.is_some()) {
+        // Fixed points are in no frame but the arm's own.
+        names.truncate(1);
+        session.fill(0);
+    }
     let together = fit_with(arm, readings, &vec![0; session.len()], vec![String::new()], sizes)?;
     if names.len() < 2 {
         return Ok(together);
@@ -272,6 +327,12 @@ impl Geometry {
         self.placed.errors(&self.frames)
     }
 
+    /// Inner products of what known distances say of the parameters, in sigmas.
+    #[must_use]
+    pub(super) fn of_distances(&self) -> DMatrix<f64> {
+        gram(&self.distances.1)
+    }
+
     /// Which frames these are.
     #[must_use]
     pub fn frames(&self) -> &FrameErrors {
@@ -289,7 +350,7 @@ impl Geometry {
     #[must_use]
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
         let jacobian = self.whitening.of(&self.jacobian) / libm::sqrt(self.level);
-        let mut normal = gram(&jacobian);
+        let mut normal = gram(&jacobian) + gram(&self.distances.1);
         (0..normal.nrows()).for_each(|at| normal[(at, at)] += 1.0);
         let mut covariance = normal.cholesky()?.inverse();
         let sigma: Vec<f64> = (0..self.free.len()).map(|column| self.sigma_of(column)).collect();
@@ -349,6 +410,8 @@ fn finish(mut problem: Placing<'_>, start: Placed, sessions: Vec<String>) -> Geo
     let far = std::mem::take(&mut problem.far);
     problem.whiten(&fit.point);
     let (residual, jacobian) = problem.raw(&fit.point);
+    let distances = problem.distances(&fit.point);
+    let placed_in_frame = problem.readings.measurements.iter().any(|row| row.fixed_point.is_none());
     Geometry {
         far,
         level: problem.level,
@@ -362,6 +425,9 @@ fn finish(mut problem: Placing<'_>, start: Placed, sessions: Vec<String>) -> Geo
         sessions,
         session: problem.session.to_vec(),
         targets: problem.targets,
+        points: problem.points,
+        distances,
+        placed_in_frame,
         target: problem.target,
         equations: problem.equations,
         whitening: problem.whitening,
@@ -375,6 +441,8 @@ fn finish(mut problem: Placing<'_>, start: Placed, sessions: Vec<String>) -> Geo
 struct Placed {
     measurement_from_root: Vec<Pose>,
     tool_from_target: Vec<Pose>,
+    /// Fixed points in the measurement frame.
+    points: Vec<Vector3<f64>>,
     /// Of the frames, over the sigmas of their priors; zero for bases and targets, which are in the poses above.
     parameters: DVector<f64>,
     /// Bases, which come before the frames.
@@ -400,6 +468,9 @@ struct Placing<'a> {
     session: &'a [usize],
     targets: Vec<String>,
     target: Vec<usize>,
+    points: Vec<String>,
+    /// Fixed point of each row.
+    point: Vec<Option<usize>>,
     equations: Equations,
     whitening: Whitening,
     bases: usize,
@@ -439,7 +510,12 @@ impl<'a> Placing<'a> {
         let equations = Equations::new(readings.sensor, measurements);
         let per_target = if equations.has_orientation() { 6 } else { 3 };
         let (before, count) = (FrameErrors::PER_FRAME * bases, FrameErrors::PER_FRAME * frames.frames());
-        let width = before + count + per_target * targets.len();
+        let mut points: Vec<String> = measurements.iter().filter_map(|row| row.fixed_point.clone()).collect();
+        points.sort_unstable();
+        points.dedup();
+        let of_row = |row: &&Measurement| row.fixed_point.as_ref().and_then(|label| points.binary_search(label).ok());
+        let point: Vec<Option<usize>> = measurements.iter().map(of_row).collect();
+        let width = before + count + per_target * targets.len() + 3 * points.len();
         let free: Vec<bool> = (0..width).map(|column| !(before..before + count).contains(&column)).collect();
         let sigma = (0..width).map(|column| if free[column] { FREE } else { sizes.sigma(&frames, column - before) }).collect();
         let whitening = Whitening::new(&equations, inverse_sigmas(&equations), readings.weights);
@@ -450,6 +526,8 @@ impl<'a> Placing<'a> {
             session,
             targets,
             target,
+            points,
+            point,
             equations,
             whitening,
             bases,
@@ -478,10 +556,14 @@ impl<'a> Placing<'a> {
             let target: Vec<usize> = rows.iter().map(|row| self.target[*row]).collect();
             stand(&tools, &read, &target, self.targets.len())
         };
-        let of_session = |base: usize| (0..measurements.len()).filter(|row| self.session[*row] == base).collect::<Vec<usize>>();
+        let of_session = |base: usize| {
+            let own = |row: &usize| self.session[*row] == base && self.point[*row].is_none();
+            (0..measurements.len()).filter(own).collect::<Vec<usize>>()
+        };
         // Of sessions with bases of their own the longest tells where the targets are.
         let rows = (0..self.bases).map(of_session).max_by_key(Vec::len).unwrap_or_default();
-        let all = of(&rows).ok_or(GeometryError::Degenerate)?;
+        let all = if rows.is_empty() { self.about_points(&poses) } else { of(&rows) };
+        let all = all.ok_or(GeometryError::Degenerate)?;
         let tool_from_target = all.tool_from_target;
         let base_of = |base: usize| {
             let rows = of_session(base);
@@ -496,6 +578,15 @@ impl<'a> Placing<'a> {
             registration(&from, &to)
         };
         let measurement_from_root = (0..self.bases).map(|base| base_of(base).unwrap_or(all.measurement_from_root)).collect();
+        let measurement_from_root: Vec<Pose> = measurement_from_root;
+        let mut points = vec![(Vector3::zeros(), 0.0); self.points.len()];
+        for (row, point) in self.point.iter().enumerate() {
+            if let Some((sum, count)) = point.map(|point| &mut points[point]) {
+                let base = &measurement_from_root[self.session[row]];
+                *sum += (base * poses[row] * tool_from_target[self.target[row]]).translation.vector;
+                *count += 1.0;
+            }
+        }
         let mut parameters = DVector::zeros(self.free.len());
         for (joint, zero) in self.readings.zeros.iter().enumerate() {
             if let Some(column) = self.frames.zero_of(joint).map(|at| FrameErrors::PER_FRAME * self.bases + at) {
@@ -505,11 +596,83 @@ impl<'a> Placing<'a> {
         Ok(Placed {
             measurement_from_root,
             tool_from_target,
+            points: points.into_iter().map(|(sum, count)| sum / count).collect(),
             parameters,
             before: FrameErrors::PER_FRAME * self.bases,
             count: FrameErrors::PER_FRAME * self.frames.frames(),
             sizes: self.sizes,
         })
+    }
+
+    /// The targets on the tool at which the readings of each fixed point come nearest to one another, the arm at its root: linear least
+    /// squares about each point's mean.
+    fn about_points(&self, poses: &[Pose]) -> Option<Standing> {
+        let targets = self.targets.len();
+        let width = 3 * targets;
+        let rows: Vec<(usize, DVector<f64>, DMatrix<f64>)> = (0..poses.len())
+            .filter_map(|row| {
+                let mut matrix = DMatrix::zeros(3, width);
+                matrix.view_mut((0, 3 * self.target[row]), (3, 3)).copy_from(poses[row].rotation.to_rotation_matrix().matrix());
+                let at = DVector::from_column_slice(poses[row].translation.vector.as_slice());
+                Some((self.point[row]?, at, matrix))
+            })
+            .collect();
+        let mut means = vec![(DVector::zeros(3), DMatrix::zeros(3, width), 0.0); self.points.len()];
+        for (point, at, matrix) in &rows {
+            let (sum, matrices, count) = &mut means[*point];
+            *sum += at;
+            *matrices += matrix;
+            *count += 1.0;
+        }
+        let mut normal = DMatrix::identity(width, width) * 1e-9;
+        let mut right = DVector::zeros(width);
+        for (point, at, matrix) in &rows {
+            let (sum, matrices, count) = &means[*point];
+            let (off, matrix) = (at - sum / *count, matrix - matrices / *count);
+            normal += matrix.tr_mul(&matrix);
+            right -= matrix.tr_mul(&off);
+        }
+        let offsets = normal.cholesky()?.solve(&right);
+        let target = |number: usize| {
+            let at = Vector3::new(offsets[3 * number], offsets[3 * number + 1], offsets[3 * number + 2]);
+            Pose::from_parts(at.into(), Default::default())
+        };
+        Some(Standing {
+            measurement_from_root: Pose::identity(),
+            tool_from_target: (0..targets).map(target).collect(),
+            left_m: 0.0,
+            spread_m: 0.0,
+        })
+    }
+
+    /// First column of the fixed points.
+    fn first_of_points(&self) -> usize {
+        self.free.len() - 3 * self.points.len()
+    }
+
+    /// What the known distances of fixed points say about `placed`: whitened residuals and Jacobian.
+    fn distances(&self, placed: &Placed) -> (DVector<f64>, DMatrix<f64>) {
+        let known: Vec<(usize, usize, &Distance)> = self
+            .readings
+            .sensor
+            .distances
+            .iter()
+            .filter_map(|of| Some((self.points.binary_search(&of.point_a).ok()?, self.points.binary_search(&of.point_b).ok()?, of)))
+            .collect();
+        let mut residual = DVector::zeros(known.len());
+        let mut jacobian = DMatrix::zeros(known.len(), self.free.len());
+        for (row, (a, b, of)) in known.into_iter().enumerate() {
+            let apart = placed.points[a] - placed.points[b];
+            let length = apart.norm().max(SMALLEST_SIGMA);
+            let sigma = of.sigma_m.max(SMALLEST_SIGMA);
+            residual[row] = (of.distance_m - length) / sigma;
+            for axis in 0..3 {
+                let change = apart[axis] / length / sigma * FREE;
+                jacobian[(row, self.first_of_points() + 3 * a + axis)] = change;
+                jacobian[(row, self.first_of_points() + 3 * b + axis)] = -change;
+            }
+        }
+        (residual, jacobian)
     }
 
     /// The chain of each pair of session and target, and where its Jacobian's columns belong.
@@ -549,6 +712,9 @@ impl<'a> Placing<'a> {
                 predicted.translation.vector += turn * Vector3::new(*x, *y, *z);
                 predicted.rotation = rotation_from_vector(&(turn * Vector3::new(*rx, *ry, *rz))) * predicted.rotation;
             }
+            if let Some(point) = self.point[row] {
+                predicted.translation.vector -= placed.points[point];
+            }
             let error = difference(measurement, &predicted);
             turn_to_residual(&mut buffer[3 * columns..], columns, &error.fixed_rows::<3>(3).into_owned());
             for equation in self.equations.of(row) {
@@ -558,6 +724,10 @@ impl<'a> Placing<'a> {
                     if let Some(column) = place {
                         jacobian[(equation, *column)] = value * self.sigma[*column];
                     }
+                }
+                if let (Some(point), 0..3) = (self.point[row], component) {
+                    let column = self.first_of_points() + 3 * point + component;
+                    jacobian[(equation, column)] = -self.sigma[column];
                 }
             }
         }
@@ -629,11 +799,16 @@ impl Problem for Placing<'_> {
     fn linearise(&self, at: &Placed) -> Linearised {
         let (residual, jacobian) = self.raw(at);
         let sigma = libm::sqrt(self.level);
-        Linearised {
-            residuals: self.whitening.of_vector(&residual) / sigma,
-            jacobian: self.whitening.of(&jacobian) / sigma,
-            departures: Some(at.parameters.clone()),
+        let (mut residuals, mut jacobian) = (self.whitening.of_vector(&residual) / sigma, self.whitening.of(&jacobian) / sigma);
+        let (of_distances, by_distances) = self.distances(at);
+        if !of_distances.is_empty() {
+            let (read, known) = (residuals.len(), of_distances.len());
+            residuals = residuals.resize_vertically(read + known, 0.0);
+            jacobian = jacobian.resize_vertically(read + known, 0.0);
+            residuals.rows_mut(read, known).copy_from(&of_distances);
+            jacobian.rows_mut(read, known).copy_from(&by_distances);
         }
+        Linearised { residuals, jacobian, departures: Some(at.parameters.clone()) }
     }
 
     fn moved(&self, from: &Placed, columns: &[usize], step: &DVector<f64>) -> Placed {
@@ -656,6 +831,10 @@ impl Problem for Placing<'_> {
         }
         for column in from.before..after {
             to.parameters[column] += change[column];
+        }
+        let first = self.first_of_points();
+        for (point, place) in to.points.iter_mut().enumerate() {
+            (0..3).for_each(|axis| place[axis] += change[first + 3 * point + axis] * self.sigma[first + 3 * point + axis]);
         }
         to
     }
@@ -705,6 +884,7 @@ mod tests {
             position_sigma_per_m: 0.0,
             orientation_sigma_rad: orientation.then_some(5e-5),
             temperature_sigma_k: None,
+            distances: Vec::new(),
             view: None,
         }
     }

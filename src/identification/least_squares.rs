@@ -501,6 +501,27 @@ impl<'a> Plain<'a> {
         &self.equations
     }
 
+    /// Takes out what the place of a fixed point, which nobody knows, does to its readings: their mean.
+    fn about_points(&self, residuals: &mut DVector<f64>, jacobian: &mut DMatrix<f64>) {
+        let mut labels: Vec<&String> = self.measurements.iter().filter_map(|row| row.fixed_point.as_ref()).collect();
+        labels.sort_unstable();
+        labels.dedup();
+        for label in labels {
+            let rows = (0..self.measurements.len()).filter(|row| self.measurements[*row].fixed_point.as_ref() == Some(label));
+            let equations: Vec<usize> = rows.flat_map(|row| self.equations.of_position(row)).collect();
+            for component in 0..3 {
+                let own: Vec<usize> = equations.iter().copied().filter(|of| self.equations.component(*of) == component).collect();
+                let count = own.len().max(1) as f64;
+                let mean = own.iter().map(|of| residuals[*of]).sum::<f64>() / count;
+                own.iter().for_each(|of| residuals[*of] -= mean);
+                for mut column in jacobian.column_iter_mut() {
+                    let mean = own.iter().map(|of| column[*of]).sum::<f64>() / count;
+                    own.iter().for_each(|of| column[*of] -= mean);
+                }
+            }
+        }
+    }
+
     /// Whether there are enough equations for `rank` parameters.
     pub(super) fn enough(&self, rank: usize) -> Result<(), IdentificationError> {
         let (equations, poses) = (self.equations.len(), self.measurements.len());
@@ -585,7 +606,9 @@ impl Problem for Plain<'_> {
                 }
             }
         }
-        Linearised { residuals, jacobian: transposed.transpose(), departures: None }
+        let mut jacobian = transposed.transpose();
+        self.about_points(&mut residuals, &mut jacobian);
+        Linearised { residuals, jacobian, departures: None }
     }
 
     fn moved(&self, from: &Vec<f64>, columns: &[usize], step: &DVector<f64>) -> Vec<f64> {

@@ -13,7 +13,7 @@ use crate::arm::{Arm, Quantity};
 use crate::measurement::equations::Equations;
 use crate::measurement::{Measurement, Role, Sensor, Weights};
 use crate::numerics;
-use crate::quality::subspace::Subspace;
+use crate::quality::subspace::{Subspace, late};
 use crate::seed::stream;
 use crate::solver::{Problem, robust, solve};
 
@@ -57,7 +57,7 @@ pub fn identify_real(
     check_joints(robot, measurements)?;
     let fit: Vec<&Measurement> = measurements.iter().filter(|row| row.role == Role::Fit).collect();
     let climbed = climb_with(robot, sensor, &fit, wishes)?;
-    let far = far_off(sensor, measurements, &climbed.geometry);
+    let far = far_off(sensor, measurements, &climbed.geometry.clone().with_points_of(measurements));
     if far.is_empty() {
         return tell(robot, sensor, measurements, wishes, climbed, Vec::new());
     }
@@ -165,12 +165,20 @@ fn tell(
 ) -> Result<Identification, IdentificationError> {
     let fit: Vec<&Measurement> = measurements.iter().filter(|row| row.role == Role::Fit).collect();
     let Climbed { geometry, rungs } = climbed;
+    let geometry = geometry.with_points_of(measurements);
     let weights = vec![1.0; fit.len()];
     let readings = Readings { sensor, measurements: &fit, weights: &weights, displacement: &[], scatter: &[], zeros: &[] };
-    let nominal = geometry.refit(robot, readings, Sizes::NOMINAL)?;
+    let nominal = geometry.refit(robot, readings, Sizes::NOMINAL)?.with_points_of(measurements);
     let aligned = &alignment::placed(robot, &nominal);
     let problem = Plain::new(aligned, sensor, Weights::Noise, &fit)?;
-    let structure = Subspace::of_components(aligned, problem.equations().components());
+    let points = fit.iter().filter_map(|row| row.fixed_point.as_ref()).collect::<std::collections::BTreeSet<_>>().len();
+    let structure = if points == 0 {
+        Subspace::of_components(aligned, problem.equations().components())
+    } else {
+        // What a ball in a socket tells is no component of a pose.
+        let nominal_chain = aligned.chain.nominal();
+        Subspace::reveal(&problem.linearise(&nominal_chain).jacobian, &late(aligned), 0.0, usize::MAX)
+    };
     problem.enough(structure.rank())?;
 
     notes.extend(geometry.notes.iter().cloned());
@@ -228,6 +236,18 @@ fn tell(
             hardly.join(", ")
         ));
     }
+    if points > 0 {
+        let known = sensor.distances.len();
+        notes.push(format!(
+            "{points} fixed points: errors are the distances of the readings of a point from where the arm has it{}{}",
+            if geometry.is_placed() { "" } else { "; where the arm stands is not known from these readings, nor is its first joint's zero" },
+            match known {
+                0 => "; without a known distance (--distances) the size of the arm is what its file says".to_owned(),
+                1 => "; 1 known distance".to_owned(),
+                _ => format!("; {known} known distances"),
+            }
+        ));
+    }
     let unread: Vec<&str> = ["x", "y", "z"]
         .into_iter()
         .zip(problem.equations().components())
@@ -253,7 +273,7 @@ fn tell(
             nominal: &at_nominal,
             predict: &predict,
             errors,
-            degrees_of_freedom: problem.equations().len().saturating_sub(seen),
+            degrees_of_freedom: problem.equations().len().saturating_sub(seen + 3 * points),
             subspace,
             covariance,
             converged: geometry.stop == crate::solver::Stop::Converged,

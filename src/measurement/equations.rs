@@ -150,6 +150,7 @@ mod tests {
             position_sigma_per_m: 1e-6,
             orientation_sigma_rad: orientation,
             temperature_sigma_k: None,
+            distances: Vec::new(),
             view: None,
         }
     }

@@ -63,6 +63,10 @@ pub struct Measurement {
     /// Gravity in the robot's root frame at this reading, m/s²; absent where nobody said: that of the robot's file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gravity_m_s2: Option<[f64; 3]>,
+    /// A point that does not move in the measurement frame and whose place nobody knows, at which the target was; the position is then none that
+    /// was read, and zero.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fixed_point: Option<String>,
     /// Which reflector on the tool was read, where there are several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<String>,
@@ -108,6 +112,21 @@ pub struct Sensor {
     pub temperature_sigma_k: Option<f64>,
     /// The cone that it sees; `None` where it sees everything.
     pub view: Option<View>,
+    /// Known distances of fixed points ([`Measurement::fixed_point`]).
+    pub distances: Vec<Distance>,
+}
+
+/// A known distance of two fixed points, such as of two sockets in one block.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Distance {
+    /// One point's label.
+    pub point_a: String,
+    /// The other's.
+    pub point_b: String,
+    /// Distance, m.
+    pub distance_m: f64,
+    /// One sigma, m.
+    pub sigma_m: f64,
 }
 
 /// What a sensor sees: a cone whose apex is the sensor's position.
@@ -130,6 +149,7 @@ impl Sensor {
             position_sigma_per_m: 0.0,
             orientation_sigma_rad,
             temperature_sigma_k: None,
+            distances: Vec::new(),
             view: None,
         }
     }

@@ -8,7 +8,7 @@
 
 use std::path::Path;
 
-use super::{Measurement, Role};
+use super::{Distance, Measurement, Role};
 
 /// A table that has been read.
 #[derive(Clone, Debug, PartialEq)]
@@ -111,6 +111,41 @@ pub enum TableError {
     },
 }
 
+/// Reads known distances of fixed points: `point_a,point_b,distance_mm,sigma_mm` (or `_m`).
+///
+/// # Errors
+/// If the file cannot be read, or names the line and what is wrong with it.
+pub fn read_distances(path: impl AsRef<Path>) -> Result<Vec<Distance>, TableError> {
+    let file = path.as_ref().display().to_string();
+    let text = std::fs::read_to_string(path.as_ref()).map_err(|source| TableError::Unreadable { file: file.clone(), source })?;
+    let wrong = |line, message| TableError::Wrong { file: file.clone(), line, message };
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
+    let header = reader.headers().map_err(|error| wrong(1, error.to_string()))?.clone();
+    let column = |name: &str| header.iter().position(|known| known == name);
+    let length = |name: &str| [("_mm", 1e-3), ("_m", 1.0)].into_iter().find_map(|(end, unit)| Some((column(&format!("{name}{end}"))?, unit)));
+    let (Some(a), Some(b), Some(distance), Some(sigma), 4) =
+        (column("point_a"), column("point_b"), length("distance"), length("sigma"), header.len())
+    else {
+        let found: Vec<&str> = header.iter().collect();
+        let message = format!("columns {}; point_a, point_b, distance_mm, sigma_mm are needed (or _m)", found.join(", "));
+        return Err(wrong(header.position().map_or(1, csv::Position::line), message));
+    };
+    let mut distances = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|error| wrong(error.position().map_or(0, csv::Position::line), error.to_string()))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let number = |(column, unit): (usize, f64)| -> Result<f64, TableError> {
+            let text = record.get(column).unwrap_or_default();
+            let value = text.parse::<f64>().ok().filter(|value| *value > 0.0 && *value <= LARGEST);
+            let name = header.get(column).unwrap_or_default();
+            Ok(value.ok_or_else(|| wrong(line, format!("`{name}` is `{text}`; a positive number is needed")))? * unit)
+        };
+        let point = |column: usize| record.get(column).unwrap_or_default().to_owned();
+        distances.push(Distance { point_a: point(a), point_b: point(b), distance_m: number(distance)?, sigma_m: number(sigma)? });
+    }
+    Ok(distances)
+}
+
 /// Largest number, in the unit of its column, that is taken for meant. Times since 1970 in ms are smaller.
 const LARGEST: f64 = 1e13;
 
@@ -129,10 +164,11 @@ enum Column {
     Dwell,
     Session,
     Target,
+    FixedPoint,
     Gravity { axis: usize },
 }
 
-const ALLOWED: &str = "pose_id, time_s, q1_rad… (or _deg, _m, _mm), x_m, y_m, z_m (or _mm), qx, qy, qz, qw, role, target, \
+const ALLOWED: &str = "pose_id, time_s, q1_rad… (or _deg, _m, _mm), x_m, y_m, z_m (or _mm), qx, qy, qz, qw, role, target, fixed_point, \
                        approach1…, temp_ambient_c, temp1_c…, payload_kg, dwell_s, session, gravity_x, gravity_y, gravity_z";
 
 /// Reads the table at `path`.
@@ -241,6 +277,7 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
                 }
                 Column::Session => row.session = Some(text.to_owned()),
                 Column::Target => row.target = Some(text.to_owned()),
+                Column::FixedPoint => row.fixed_point = (!text.is_empty()).then(|| text.to_owned()),
                 Column::Gravity { axis } => {
                     let value = number()?;
                     row.gravity_m_s2.get_or_insert_default()[*axis] = value;
@@ -249,6 +286,15 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
         }
         if let Some(read) = row.gravity_m_s2 {
             row.gravity_m_s2 = Some(free_fall(read).map_err(|what| wrong(line, what))?);
+        }
+        if let Some(label) = &row.fixed_point {
+            if row.unread != [true; 3] {
+                let message = format!(
+                    "a position and the fixed point `{label}`: a reading is of one or the other; leave x, y, z empty, or `fixed_point`"
+                );
+                return Err(wrong(line, message));
+            }
+            row.unread = [false; 3];
         }
         if row.unread == [true; 3] {
             return Err(wrong(line, "none of x, y, z was read; leave the row out".to_owned()));
@@ -329,13 +375,16 @@ pub fn write(measurements: &[Measurement], slides: &[bool]) -> Result<String, cs
         |present: bool, names: &[&str]| if present { names.iter().map(|name| (*name).to_owned()).collect() } else { Vec::new() };
     let mut header = names(true, &["pose_id", "role", "time_s"]);
     header.extend((0..joints).map(|joint| joint_column(joint, slides)));
-    let axes: Vec<usize> = (0..3).filter(|axis| measurements.iter().any(|row| !row.unread[*axis])).collect();
+    let is_read = |row: &Measurement, axis: usize| !row.unread[axis] && row.fixed_point.is_none();
+    let axes: Vec<usize> = (0..3).filter(|axis| measurements.iter().any(|row| is_read(row, *axis))).collect();
+    let fixed = measurements.iter().any(|row| row.fixed_point.is_some());
     header.extend(axes.iter().map(|axis| ["x_m", "y_m", "z_m"][*axis].to_owned()));
     header.extend(names(orientation, &["qx", "qy", "qz", "qw"]));
     header.extend((1..=sensors).map(|sensor| format!("temp{sensor}_c")));
     header.extend((1..=joints).filter(|_| approach).map(|joint| format!("approach{joint}")));
     header.extend(names(gravity, &["gravity_x", "gravity_y", "gravity_z"]));
     header.extend(optional.iter().filter(|(_, present)| *present).map(|(name, _)| (*name).to_owned()));
+    header.extend(names(fixed, &["fixed_point"]));
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(&header)?;
     for row in measurements {
@@ -343,7 +392,7 @@ pub fn write(measurements: &[Measurement], slides: &[bool]) -> Result<String, cs
         let mut fields = vec![row.pose_id.to_string(), role.to_owned(), row.time_s.to_string()];
         let quaternion = row.orientation_xyzw.iter().filter(|_| orientation).flatten();
         fields.extend(row.joints.iter().map(f64::to_string));
-        fields.extend(axes.iter().map(|axis| if row.unread[*axis] { String::new() } else { row.position_m[*axis].to_string() }));
+        fields.extend(axes.iter().map(|axis| if is_read(row, *axis) { row.position_m[*axis].to_string() } else { String::new() }));
         fields.extend(quaternion.chain(&row.temperatures_c[..sensors]).map(f64::to_string));
         fields.extend(row.approach.iter().filter(|_| approach).map(i8::to_string));
         fields.extend(row.gravity_m_s2.iter().flatten().filter(|_| gravity).map(f64::to_string));
@@ -351,6 +400,7 @@ pub fn write(measurements: &[Measurement], slides: &[bool]) -> Result<String, cs
         let values =
             [number(row.ambient_c), number(row.payload_kg), number(row.dwell_s), row.session.clone(), row.target.clone()];
         fields.extend(optional.iter().zip(values).filter(|((_, present), _)| *present).filter_map(|(_, value)| value));
+        fields.extend(fixed.then(|| row.fixed_point.clone().unwrap_or_default()));
         writer.write_record(&fields)?;
     }
     let bytes = writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))?;
@@ -402,8 +452,11 @@ impl Layout {
         let columns_of =
             |axis: usize| columns.iter().filter(|of| matches!(of, Column::Position { axis: its, .. } if *its == axis)).count();
         let of_axes = [0, 1, 2].map(columns_of);
-        if of_axes == [0; 3] || of_axes.iter().any(|count| *count > 1) {
-            return Err("the measured position needs x_m, y_m, z_m (or _mm), those that were read, each once".to_owned());
+        let is_fixed = columns.iter().any(|column| matches!(column, Column::FixedPoint));
+        if (of_axes == [0; 3] && !is_fixed) || of_axes.iter().any(|count| *count > 1) {
+            return Err("the measured position needs x_m, y_m, z_m (or _mm), those that were read, each once; or fixed_point, a label of the \
+                        unknown place at which the target was"
+                .to_owned());
         }
         let components = numbered(columns, |column| match column {
             Column::Quaternion { component } => Some(*component),
@@ -458,6 +511,7 @@ fn column(name: &str) -> Result<Column, String> {
         "time_s" => Some(Column::Time),
         "role" => Some(Column::Role),
         "target" => Some(Column::Target),
+        "fixed_point" => Some(Column::FixedPoint),
         "temp_ambient_c" => Some(Column::Ambient),
         "payload_kg" => Some(Column::Payload),
         "dwell_s" => Some(Column::Dwell),

@@ -107,6 +107,9 @@ fn events(size: &Size) -> Vec<Event> {
             scene: "name = \"synthetic\"\nseed = 11 # ünïcode, \"quotes\"\n".to_owned(),
             poses: Some(19),
             real: Some(RealCell {
+                only: None,
+                zeros: Vec::new(),
+                distances: Vec::new(),
                 urdf: Some("<robot/>".to_owned()),
                 base_link: Some("base_link".to_owned()),
                 tip_link: Some("tool".to_owned()),
@@ -188,6 +191,8 @@ fn events(size: &Size) -> Vec<Event> {
     };
     let parameters = arm().chain.parameters;
     events.push(Event::Identified(Identification {
+        joint_frames: Vec::new(),
+        ladder: Vec::new(),
         converged: true,
         reason: "the step is small".to_owned(),
         iterations: 4,

@@ -419,6 +419,7 @@ fn sensor(file: &SensorToml) -> Checked<Sensor> {
             .orientation_noise_deg
             .map(|degrees| declared_noise(degrees, "sensor.attitude_noise_deg").map(f64::to_radians))
             .transpose()?,
+        distances: Vec::new(),
         temperature_sigma_k: file
             .temperature_noise_k
             .map(|sigma| not_negative(sigma, "sensor.temperature_noise_k"))

@@ -152,6 +152,7 @@ mod tests {
             position_sigma_per_m: 0.0,
             orientation_sigma_rad: None,
             temperature_sigma_k: None,
+            distances: Vec::new(),
             view: None,
         };
         let reading = Measurement::default();

@@ -122,7 +122,10 @@ struct Search<'a> {
 #[must_use]
 pub fn explanations(arm: &Arm, said: &Said, rows: &[&Measurement]) -> Vec<Explanation> {
     let search = Search { chain: arm.chain.at_nominal(), slides: arm.slides(), said };
-    let all: Vec<Measurement> = rows.iter().map(|row| (*row).clone()).collect();
+    let all = in_frame(rows);
+    if all.is_empty() {
+        return Vec::new();
+    }
     let step = all.len().div_ceil(LOOKED_AT).max(1);
     let few: Vec<Measurement> = all.iter().step_by(step).cloned().collect();
     let start = Trial { fixes: Vec::new(), left: search.left(&Read::of(&few)), rows: few };
@@ -147,11 +150,19 @@ pub fn explanations(arm: &Arm, said: &Said, rows: &[&Measurement]) -> Vec<Explan
     Vec::new()
 }
 
+/// The readings that have a position; fixed points have none.
+fn in_frame(rows: &[&Measurement]) -> Vec<Measurement> {
+    rows.iter().filter(|row| row.fixed_point.is_none()).map(|row| (*row).clone()).collect()
+}
+
 /// Whether the nominal arm, base and target placed, leaves more of `rows` than an arm of this kind may.
 #[must_use]
 pub fn is_suspicious(arm: &Arm, rows: &[&Measurement]) -> bool {
     let search = Search { chain: arm.chain.at_nominal(), slides: arm.slides(), said: &Said::default() };
-    let all: Vec<Measurement> = rows.iter().map(|row| (*row).clone()).collect();
+    let all = in_frame(rows);
+    if all.is_empty() {
+        return false;
+    }
     search.left(&Read::of(&all)).share >= EXPLAINED
 }
 

@@ -67,6 +67,7 @@ impl Situation {
             position_sigma_per_m: 6e-6,
             orientation_sigma_rad: (self.sees == Sees::Pose).then_some(0.003 * std::f64::consts::PI / 180.0),
             temperature_sigma_k: None,
+            distances: Vec::new(),
             view: (self.reach == Reach::Cone)
                 .then(|| View { towards_in_base: Point3::new(0.4, 0.0, 0.5), half_angle_rad: CONE_RAD }),
         };
