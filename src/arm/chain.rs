@@ -491,6 +491,19 @@ impl FrameErrors {
         self.kinds.len() - 1
     }
 
+    /// The frames' errors when the arm is larger by its own size: as much as each joint frame is away from the one before.
+    #[must_use]
+    pub fn growth(&self) -> Vec<f64> {
+        let of = |segment: &Prepared| match segment {
+            Prepared::Fixed { rotation, translation } => {
+                let own = rotation.transpose() * translation;
+                [own.x, own.y, own.z, 0.0, 0.0, 0.0]
+            }
+            _ => [0.0; 6],
+        };
+        self.segments[1..self.kinds.len()].iter().flat_map(of).collect()
+    }
+
     /// Which error of the frames is the zero of `joint` (from 0): the turn about its axis, or the shift along it where it slides. That of
     /// the first joint is part of the base.
     #[must_use]

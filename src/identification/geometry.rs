@@ -34,6 +34,8 @@ const SETTLED: f64 = 0.05;
 const SMALLEST_SIGMA: f64 = 1e-9;
 /// Improvement over the noise's mean square, by parameter, from which on sessions have bases of their own (an F value).
 const OWN_BASE: f64 = 6.0;
+/// One sigma of an arm's size over its nominal one where nothing else tells it.
+const SAME_SIZE: f64 = 1e-4;
 /// Readings of a session from which on they alone say where to look for its base.
 const OWN_START: usize = 4;
 
@@ -312,6 +314,8 @@ impl Geometry {
         let mut problem = Placing::new(arm, readings, &self.session, self.sessions.len(), sizes)?;
         let errors = self.placed.errors(&self.frames);
         let mut start = Placed { sizes, ..self.placed.clone() };
+        // Points that were added afterwards are none of these readings.
+        start.points.truncate(problem.points.len());
         for (at, error) in errors.iter().enumerate() {
             let sigma = sizes.sigma(&self.frames, at);
             start.parameters[start.before + at] = if sigma > 0.0 { error / sigma } else { 0.0 };
@@ -659,8 +663,21 @@ impl<'a> Placing<'a> {
             .iter()
             .filter_map(|of| Some((self.points.binary_search(&of.point_a).ok()?, self.points.binary_search(&of.point_b).ok()?, of)))
             .collect();
-        let mut residual = DVector::zeros(known.len());
-        let mut jacobian = DMatrix::zeros(known.len(), self.free.len());
+        // Readings of fixed points alone leave the size of the arm open, and least squares would shrink it to a point.
+        let sized = !known.is_empty() || self.point.iter().any(Option::is_none);
+        let (count, more) = (known.len(), usize::from(!sized));
+        let mut residual = DVector::zeros(count + more);
+        let mut jacobian = DMatrix::zeros(count + more, self.free.len());
+        if !sized {
+            let growth = self.frames.growth();
+            let total: f64 = growth.iter().map(|value| value * value).sum::<f64>().max(SMALLEST_SIGMA);
+            for (at, value) in growth.iter().enumerate() {
+                let column = placed.before + at;
+                let share = value / total / SAME_SIZE;
+                residual[count] -= share * placed.parameters[column] * self.sigma[column];
+                jacobian[(count, column)] = share * self.sigma[column];
+            }
+        }
         for (row, (a, b, of)) in known.into_iter().enumerate() {
             let apart = placed.points[a] - placed.points[b];
             let length = apart.norm().max(SMALLEST_SIGMA);

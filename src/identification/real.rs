@@ -165,10 +165,10 @@ fn tell(
 ) -> Result<Identification, IdentificationError> {
     let fit: Vec<&Measurement> = measurements.iter().filter(|row| row.role == Role::Fit).collect();
     let Climbed { geometry, rungs } = climbed;
-    let geometry = geometry.with_points_of(measurements);
     let weights = vec![1.0; fit.len()];
     let readings = Readings { sensor, measurements: &fit, weights: &weights, displacement: &[], scatter: &[], zeros: &[] };
     let nominal = geometry.refit(robot, readings, Sizes::NOMINAL)?.with_points_of(measurements);
+    let geometry = geometry.with_points_of(measurements);
     let aligned = &alignment::placed(robot, &nominal);
     let problem = Plain::new(aligned, sensor, Weights::Noise, &fit)?;
     let points = fit.iter().filter_map(|row| row.fixed_point.as_ref()).collect::<std::collections::BTreeSet<_>>().len();

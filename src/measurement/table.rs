@@ -602,6 +602,7 @@ mod tests {
     #[test]
     fn what_is_written_is_read_back_bit_for_bit() {
         let row = |index: usize| Measurement {
+            fixed_point: None,
             index,
             pose_id: index / 2,
             role: if index == 1 { Role::HeldOut } else { Role::Fit },

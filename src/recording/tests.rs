@@ -162,6 +162,7 @@ fn events(size: &Size) -> Vec<Event> {
     for (index, joints) in configurations(&mut stream, size.measurements).into_iter().enumerate() {
         let pose = chain.forward(&joints);
         events.push(Event::Measured(Measurement {
+            fixed_point: None,
             gravity_m_s2: Some([0.0, 0.0, -9.81]),
             index,
             pose_id: index,

@@ -312,12 +312,14 @@ struct Build<'a> {
     path: &'a [&'a urdf_rs::Joint],
     base: &'a str,
     chain: Chain,
+    /// Links of which meshes were skipped.
+    with_meshes: Vec<String>,
     notes: Vec<String>,
 }
 
 impl<'a> Build<'a> {
     fn new(tree: &'a Tree<'a>, base: &'a str, path: &'a [&'a urdf_rs::Joint]) -> Self {
-        Build { tree, path, base, chain: Chain::new(), notes: Vec::new() }
+        Build { tree, path, base, chain: Chain::new(), with_meshes: Vec::new(), notes: Vec::new() }
     }
 
     fn run(mut self) -> Result<Imported, UrdfError> {
@@ -364,6 +366,10 @@ impl<'a> Build<'a> {
             self.push_tool([0.0; 3], [0.0; 3], name);
         }
         let links = links.into_iter().map(|(name, bodies)| self.link(name, &bodies)).collect::<Result<Vec<Link>, UrdfError>>()?;
+        if !self.with_meshes.is_empty() {
+            let names = self.with_meshes.join(", ");
+            self.notes.push(format!("meshes are skipped, so that collisions of these links are not seen: {names}"));
+        }
         let without: Vec<&str> =
             links[1..].iter().filter(|link| link.inertial.is_none()).map(|link| link.name.as_str()).collect();
         if !without.is_empty() {
@@ -562,8 +568,7 @@ impl<'a> Build<'a> {
             shapes.push(Shape { link_from_shape: pose(origin), geometry });
         }
         if meshes > 0 {
-            let name = &link.name;
-            self.notes.push(format!("link {name}: {meshes} mesh(es) skipped, so collisions of that part are not seen"));
+            self.with_meshes.push(link.name.clone());
         }
         with_capsules(shapes)
     }
