@@ -95,7 +95,7 @@ pub(crate) struct Scheme {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Block {
-    /// A region of the workspace.
+    /// A region of the workspace; of readings at fixed points, one configuration in as many as there are folds.
     Region,
     /// What the tool carries.
     Payload,
@@ -115,7 +115,9 @@ pub(crate) fn schemes(
     let folds = settings.folds;
     let points: Vec<Vector3<f64>> = groups.rows.iter().map(|rows| targets[rows[0]]).collect();
     let most = folds.min(points.len() / settings.configurations).max(2);
-    let of_group = regions(&points, most);
+    // Where a fixed point is, only its own readings tell: a fold has some of each.
+    let sockets = measurements.iter().any(|row| row.fixed_point.is_some());
+    let of_group = if sockets { (0..points.len()).map(|group| group % most).collect() } else { regions(&points, most) };
     let by_region = groups.of.iter().map(|group| of_group[*group]).collect();
     let mut schemes = vec![Scheme::new(Block::Region, by_region, &[], folds)];
     let payload: Vec<f64> = measurements.iter().map(|row| row.payload_kg.unwrap_or(0.0)).collect();
@@ -133,6 +135,9 @@ pub(crate) fn schemes(
     let sessions: Vec<String> = sessions.iter().map(|name| (*name).to_owned()).collect();
     for (by, fold, names) in [(Block::Payload, at_payload, payloads), (Block::Session, at_session, sessions)] {
         let scheme = Scheme::new(by, fold, &names, folds);
+        if sockets && by == Block::Session {
+            continue;
+        }
         if (0..scheme.folds).any(|out| scheme.leaves_enough(out, settings.left)) && scheme.folds > 1 {
             schemes.push(scheme);
         }

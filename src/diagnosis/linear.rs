@@ -34,7 +34,7 @@ impl<'a> Linear<'a> {
         scale: f64,
     ) -> Linear<'a> {
         let offset = DVector::from_fn(rows.jacobian.ncols(), |at, _| if rows.free[at] { 0.0 } else { rows.parameters[at] });
-        let prior = GeometryPrior { offset, free: rows.free.clone(), scale };
+        let prior = GeometryPrior { offset, free: rows.free.clone(), scale, known: rows.known.clone() };
         Linear { rows, readings, candidates, residual, prior }
     }
 

@@ -217,6 +217,8 @@ pub(crate) struct GeometryPrior {
     pub(crate) free: Vec<bool>,
     /// Sigma over that of the fit.
     pub(crate) scale: f64,
+    /// What is known besides, such as distances of fixed points: residuals in sigmas, and what the parameters do to them.
+    pub(crate) known: (DVector<f64>, DMatrix<f64>),
 }
 
 impl GeometryPrior {
@@ -282,6 +284,13 @@ impl<'a> Marginal<'a> {
             mixed[(parameter, last)] -= precision * offset;
             residual += precision * offset * offset;
             log_geometry += 0.5 * libm::log(precision);
+        }
+        let (of_known, by_known) = &prior.known;
+        if !of_known.is_empty() {
+            normal += by_known.tr_mul(by_known);
+            let mut of_residual = mixed.column_mut(last);
+            of_residual += by_known.tr_mul(of_known);
+            residual += of_known.norm_squared();
         }
         let cholesky = Cholesky::new(normal.clone())?;
         let absorbed = cholesky.solve(&mixed);
@@ -459,7 +468,7 @@ pub(super) struct TestProducts(Products);
 #[cfg(test)]
 impl TestProducts {
     pub(super) fn marginal(&self) -> Marginal<'_> {
-        let prior = GeometryPrior { offset: DVector::zeros(0), free: Vec::new(), scale: 1.0 };
+        let prior = GeometryPrior { offset: DVector::zeros(0), free: Vec::new(), scale: 1.0, known: (DVector::zeros(0), DMatrix::zeros(0, 0)) };
         Marginal::new(&self.0, None, &prior).unwrap()
     }
 }

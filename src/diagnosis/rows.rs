@@ -98,6 +98,8 @@ pub(crate) struct Rows {
     pub(crate) largest_errors: [f64; 2],
     /// Which parameters are free (base and target).
     pub(crate) free: Vec<bool>,
+    /// What known distances of fixed points say ([`geometry::Geometry::known`]).
+    pub(crate) known: (DVector<f64>, DMatrix<f64>),
     /// What is worth knowing about the sessions.
     pub(crate) notes: Vec<String>,
     /// Axes of the root in measurement of each row.
@@ -279,6 +281,7 @@ fn of_geometry(arm: &Arm, measurements: &[&Measurement], fitted: geometry::Geome
         .collect();
     let turns: Vec<Matrix3<f64>> =
         fitted.measurement_from_root().iter().map(|base| base.rotation.to_rotation_matrix().into_inner()).collect();
+    let known = fitted.known().clone();
     Rows {
         mechanism,
         turn: fitted.session.iter().map(|session| turns[*session]).collect(),
@@ -291,6 +294,7 @@ fn of_geometry(arm: &Arm, measurements: &[&Measurement], fitted: geometry::Geome
         whitening: fitted.whitening,
         jacobian: fitted.jacobian,
         far: fitted.far,
+        known,
         free: fitted.free,
         notes: fitted.notes,
     }

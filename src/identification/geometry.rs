@@ -331,10 +331,11 @@ impl Geometry {
         self.placed.errors(&self.frames)
     }
 
-    /// Inner products of what known distances say of the parameters, in sigmas.
+    /// What is known besides the readings (distances of fixed points, or the arm's size where nothing tells it): residuals in sigmas, and
+    /// what one prior sigma of each parameter does to them.
     #[must_use]
-    pub(super) fn of_distances(&self) -> DMatrix<f64> {
-        gram(&self.distances.1)
+    pub fn known(&self) -> &(DVector<f64>, DMatrix<f64>) {
+        &self.distances
     }
 
     /// Which frames these are.

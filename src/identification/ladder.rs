@@ -132,7 +132,7 @@ fn left_out(geometry: &Geometry, readings: Readings<'_>, good: &[bool]) -> LeftO
     let sigma = libm::sqrt(geometry.level);
     let jacobian = geometry.whitening.of(&geometry.jacobian) / sigma;
     let residual = geometry.whitening.of_vector(&geometry.residual) / sigma;
-    let mut normal = gram(&jacobian) + geometry.of_distances();
+    let mut normal = gram(&jacobian) + gram(&geometry.known().1);
     (0..normal.nrows()).for_each(|at| normal[(at, at)] += 1.0);
     let fold_of = folds(readings);
     let equations = &geometry.equations;
