@@ -305,6 +305,16 @@ pub(crate) struct RobotOptions {
     /// Declared orientation noise of a table's sensor, one sigma per axis [default: 0.005]
     #[arg(long = "attitude-noise-deg", value_name = "DEG", allow_negative_numbers = true)]
     pub(crate) orientation_noise_deg: Option<f64>,
+    /// How three angles of a table make an orientation: rpy (URDF, ROS), abc (KUKA), wpr (FANUC), rotvec (Universal Robots), or the order of
+    /// the turns, such as xyz about fixed axes or ZYX about moving ones
+    #[arg(long, value_name = "CONVENTION")]
+    pub(crate) euler: Option<String>,
+    /// Ticks of the joints' encoders per turn, for columns q1_ticks …
+    #[arg(long, value_name = "N")]
+    pub(crate) ticks_per_turn: Option<f64>,
+    /// Columns of a table that are not to be read
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub(crate) ignore_columns: Vec<String>,
     /// Known distances of fixed points: point_a,point_b,distance_mm,sigma_mm
     #[arg(long, value_name = "FILE")]
     pub(crate) distances: Option<PathBuf>,

@@ -123,8 +123,9 @@ fn with_evaluation(mut measurements: Vec<Measurement>, options: &IdentifyOptions
         }
         event::measurements(&recording.events)
     } else {
-        let table = table::read(other)?;
+        let mut table = input::read_table(other, arm, &options.robot)?;
         input::check_units(other, &table, arm)?;
+        input::corrected(&mut table, arm, &options.robot)?;
         table.measurements
     };
     ensure!(!others.is_empty(), "{} holds no measurements", other.display());

@@ -85,8 +85,9 @@ pub(crate) struct Front {
 pub(crate) fn front(command: &str, path: &Path, options: &RobotOptions) -> anyhow::Result<Front> {
     let robot = robot_of_table(path, options)?;
     let (start, mut real) = described(command, robot, options)?;
-    let mut table = read_table(path, options)?;
     let (arm, mut notes) = session::real_robot(&start, &real).with_context(|| robot.display().to_string())?;
+    let mut table = read_table(path, &arm, options)?;
+    notes.extend(table.notes.iter().cloned());
     check_units(path, &table, &arm)?;
     check_joints(path, &table.measurements, arm.joint_count())?;
     for distance in &real.distances {
@@ -99,15 +100,9 @@ pub(crate) fn front(command: &str, path: &Path, options: &RobotOptions) -> anyho
             );
         }
     }
+    let (said, corrections) = corrected(&mut table, &arm, options)?;
+    notes.extend(corrections);
     let slides = arm.slides();
-    let turning = table.joint_factor.iter().zip(&slides).find(|(_, slides)| !**slides);
-    let said = Said { angle: turning.map_or(1.0, |(factor, _)| *factor), position: table.position_factor };
-    for text in &options.fix_columns {
-        let fix: Fix = text.parse().map_err(|wrong| anyhow::anyhow!("--fix-columns {wrong}"))?;
-        fix.apply(&mut table.measurements, &said, &slides).map_err(|wrong| anyhow::anyhow!("--fix-columns {text}: {wrong}"))?;
-        let names: Vec<String> = arm.chain.joints.iter().map(|joint| joint.name.clone()).collect();
-        notes.push(format!("corrected as --fix-columns {text} says: {}", fix.words(&names)));
-    }
     let fitted: Vec<&Measurement> = table.measurements.iter().filter(|row| row.role == Role::Fit).collect();
     let sensor = session::real_sensor(&real, &table.measurements);
     // Parameters that are free enough explain wrong units, too.
@@ -130,9 +125,34 @@ pub(crate) fn front(command: &str, path: &Path, options: &RobotOptions) -> anyho
     Ok(Front { start, real, arm, table, notes })
 }
 
+/// Corrects `table` as `--fix-columns` says; the units that its columns say, and what was corrected.
+pub(crate) fn corrected(table: &mut table::Table, arm: &Arm, options: &RobotOptions) -> anyhow::Result<(Said, Vec<String>)> {
+    let slides = arm.slides();
+    let turning = table.joint_factor.iter().zip(&slides).find(|(_, slides)| !**slides);
+    let said = Said { angle: turning.map_or(1.0, |(factor, _)| *factor), position: table.position_factor };
+    let mut notes = Vec::new();
+    for text in &options.fix_columns {
+        let fix: Fix = text.parse().map_err(|wrong| anyhow::anyhow!("--fix-columns {wrong}"))?;
+        fix.apply(&mut table.measurements, &said, &slides).map_err(|wrong| anyhow::anyhow!("--fix-columns {text}: {wrong}"))?;
+        let names: Vec<String> = arm.chain.joints.iter().map(|joint| joint.name.clone()).collect();
+        notes.push(format!("corrected as --fix-columns {text} says: {}", fix.words(&names)));
+    }
+    Ok((said, notes))
+}
+
 /// Reads the table of `input`, with gravity as it was said on the command line.
-fn read_table(path: &Path, options: &RobotOptions) -> anyhow::Result<table::Table> {
-    let mut table = table::read(path)?;
+pub(crate) fn read_table(path: &Path, arm: &Arm, options: &RobotOptions) -> anyhow::Result<table::Table> {
+    let euler = options.euler.as_ref().map(|text| text.parse().map_err(|wrong| anyhow::anyhow!("--euler {wrong}"))).transpose()?;
+    if let Some(ticks) = options.ticks_per_turn {
+        ensure!(ticks.is_finite() && ticks.abs() >= 1.0, "--ticks-per-turn {ticks}: a number of at least 1 is needed, such as 4096");
+    }
+    let reading = table::Reading {
+        joints: arm.chain.joints.iter().map(|joint| (joint.name.clone(), joint.kind == JointKind::Prismatic)).collect(),
+        euler,
+        ticks_per_turn: options.ticks_per_turn,
+        ignored: options.ignore_columns.clone(),
+    };
+    let mut table = table::read_as(path, &reading)?;
     if !options.gravity.is_empty() {
         let said = options.gravity.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
         let Ok(gravity) = <[f64; 3]>::try_from(options.gravity.as_slice()) else {
@@ -183,6 +203,8 @@ pub(crate) fn no_links(options: &RobotOptions, why: &str) -> anyhow::Result<()> 
 pub(crate) fn no_robot(options: &RobotOptions) -> anyhow::Result<()> {
     no_links(options, "a recording carries its own nominal arm; leave it out")?;
     ensure!(options.gravity.is_empty(), "--gravity: a recording has its own; leave it out");
+    let of_tables = options.euler.is_some() || options.ticks_per_turn.is_some() || !options.ignore_columns.is_empty();
+    ensure!(!of_tables, "--euler, --ticks-per-turn, --ignore-columns: a recording has been read already; leave them out");
     ensure!(options.distances.is_none(), "--distances: a recording has its own; leave it out");
     ensure!(options.fix_columns.is_empty(), "--fix-columns: a recording has been corrected already; leave it out");
     ensure!(

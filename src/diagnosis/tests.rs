@@ -273,7 +273,7 @@ fn too_few_readings_are_refused_and_swapped_joints_are_said() {
     }
     let swapped: Vec<&Measurement> = rows.iter().collect();
     let message = diagnose(&arm, &sensor(), &swapped, &options).unwrap_err().to_string();
-    assert!(message.contains("swapped"), "{message}");
+    assert!(message.contains("order:1,3,2,4,5,6,7,8"), "{message}");
 }
 
 #[test]
@@ -391,8 +391,8 @@ fn what_a_table_got_wrong_is_named() {
         let error = diagnose(&arm, &sensor(), &rows, &options).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");
     };
-    says(&|row| row.joints.swap(3, 5), "the columns of joints 4 and 6 were swapped");
-    says(&|row| row.joints[4] = -row.joints[4], "joint 5 counted the other way round");
+    says(&|row| row.joints.swap(3, 5), "--fix-columns order:1,2,3,6,5,4,7,8");
+    says(&|row| row.joints[4] = -row.joints[4], "--fix-columns reverse:5");
     says(&|row| row.joints[3] = 0.3, "The readings of joint 4 never change");
     says(&|row| row.joints.iter_mut().for_each(|joint| *joint *= 57.295_779_5), "the joint angles were degrees");
     says(&|row| row.position_m = row.position_m.map(|value| value * 1e-3), "the positions were metres");

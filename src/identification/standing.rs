@@ -60,7 +60,18 @@ struct Sight {
 pub fn stand(tools: &[Pose], measurements: &[&Measurement], target: &[usize], targets: usize) -> Option<Standing> {
     // A coordinate that was not read is taken as zero where there are no others: near enough to begin with.
     let whole: Vec<usize> = (0..measurements.len()).filter(|row| measurements[*row].unread == [false; 3]).collect();
-    let rows = if whole.is_empty() { (0..measurements.len()).collect() } else { whole };
+    let every: Vec<usize> = (0..measurements.len()).collect();
+    let of_whole = if whole.is_empty() { None } else { stand_of(&whole, tools, measurements, target, targets) };
+    of_whole.or_else(|| stand_of(&every, tools, measurements, target, targets))
+}
+
+fn stand_of(
+    rows: &[usize],
+    tools: &[Pose],
+    measurements: &[&Measurement],
+    target: &[usize],
+    targets: usize,
+) -> Option<Standing> {
     let sights: Vec<Sight> = rows
         .iter()
         .map(|row| Sight {

@@ -1011,6 +1011,7 @@ fn a_measurement_without_conditions_reads_as_without() {
         gravity_m_s2: Some([0.0, 0.0, -9.81]),
         session: Some("1".to_owned()),
         target: Some("A".to_owned()),
+        fixed_point: Some("socket".to_owned()),
         unread: [false, false, true],
         ..expected
     };

@@ -30,7 +30,7 @@ const BETTER: f64 = 0.25;
 /// Rounds of placing base and target in turn.
 const ROUNDS: usize = 6;
 /// Sets of mistakes that are taken further.
-const BEAM: usize = 6;
+const BEAM: usize = 16;
 /// Mistakes in one table, at most.
 const MOST: usize = 6;
 /// Joints up to which every order is tried.

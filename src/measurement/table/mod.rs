@@ -1,14 +1,23 @@
 //! Measurement tables (CSV): what a real cell writes down.
 //!
-//! A header names the columns and their units; `#` starts a comment line; columns stand in any order; an unknown column is an error.
+//! A header names the columns and their units; `#` starts a comment line; columns stand in any order; an unknown column is an error. Columns
+//! are separated by commas, semicolons or tabs, numbers may have decimal commas, the file may be UTF-8 or UTF-16.
 //! `pose_id`, `time_s`, `q1_rad`…`qN_rad` (or `_deg`; `_m`, `_mm` for prismatic joints), `x_m, y_m, z_m` (or `_mm`; those that were
 //! read, a cell may be empty), optional `qx, qy, qz, qw`, `role` (`fit`, `held_out`), and the conditions: `approach1`… (-1, 0, 1), `temp_ambient_c`, `temp1_c`…, `payload_kg`,
 //! `dwell_s`, `session`, `target`, `gravity_x, gravity_y, gravity_z` (m/s², in the robot's root). Rows are in the order of measuring unless
 //! the comment `# order: unknown` stands in the file.
 
+mod header;
+mod text;
+
 use std::path::Path;
 
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+use header::{Column, Header, Orientation};
+
 use super::{Distance, Measurement, Role};
+use crate::arm::frames::rotation_from_vector;
 
 /// A table that has been read.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +32,8 @@ pub struct Table {
     pub position_factor: [f64; 3],
     /// Columns of conditions: an identification uses [`TO_IDENTIFY`] of them, a diagnosis all.
     pub conditions: Vec<String>,
+    /// What was taken to be meant, and rows that were left out.
+    pub notes: Vec<String>,
     /// Whether the order of measuring is known: that of the rows, or of their times.
     pub in_order: bool,
 }
@@ -149,37 +160,99 @@ pub fn read_distances(path: impl AsRef<Path>) -> Result<Vec<Distance>, TableErro
 /// Largest number, in the unit of its column, that is taken for meant. Times since 1970 in ms are smaller.
 const LARGEST: f64 = 1e13;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Column {
-    PoseId,
-    Time,
-    Joint { joint: usize, factor: f64, is_length: bool },
-    Position { axis: usize, factor: f64 },
-    Quaternion { component: usize },
-    Role,
-    Temperature { sensor: usize },
-    Approach { joint: usize },
-    Ambient,
-    Payload,
-    Dwell,
-    Session,
-    Target,
-    FixedPoint,
-    Gravity { axis: usize },
+/// What is known of a table beside its text.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Reading {
+    /// Names of the robot's joints, which its columns may have, and which of them slide.
+    pub joints: Vec<(String, bool)>,
+    /// How three angles make an orientation.
+    pub euler: Option<Euler>,
+    /// Ticks of the encoders per turn.
+    pub ticks_per_turn: Option<f64>,
+    /// Columns that are not to be read.
+    pub ignored: Vec<String>,
 }
 
-const ALLOWED: &str = "pose_id, time_s, q1_rad… (or _deg, _m, _mm), x_m, y_m, z_m (or _mm), qx, qy, qz, qw, role, target, fixed_point, \
-                       approach1…, temp_ambient_c, temp1_c…, payload_kg, dwell_s, session, gravity_x, gravity_y, gravity_z";
+/// How three numbers make an orientation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Euler {
+    /// Turns about these axes (0, 1, 2), one after the other; of the moving frame, or of the fixed one.
+    Turns {
+        /// In the order in which they are made.
+        axes: [usize; 3],
+        /// Whether about the axes that move with the frame.
+        moving: bool,
+    },
+    /// They are a rotation vector: axis times angle.
+    Vector,
+}
+
+impl std::str::FromStr for Euler {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Euler, String> {
+        let named = match text {
+            "rpy" | "wpr" => "xyz",
+            "abc" => "ZYX",
+            "rotvec" => return Ok(Euler::Vector),
+            other => other,
+        };
+        let moving = named.chars().all(|c| c.is_ascii_uppercase());
+        let axes: Vec<usize> = named.chars().filter_map(|c| "xyz".find(c.to_ascii_lowercase())).collect();
+        let same_case = moving || named.chars().all(|c| c.is_ascii_lowercase());
+        match axes.as_slice() {
+            [a, b, c] if named.len() == 3 && same_case && a != b && b != c && a != c => Ok(Euler::Turns { axes: [*a, *b, *c], moving }),
+            _ => Err(format!(
+                "{text}: rpy (URDF, ROS: fixed x, y, z), abc (KUKA), wpr (FANUC), rotvec (Universal Robots), or the order of the turns, such as \
+                 xyz about fixed axes or ZYX about moving ones, is needed"
+            )),
+        }
+    }
+}
+
+impl Euler {
+    /// The orientation of `angles` about (or along) x, y and z, rad.
+    fn turn(self, angles: [f64; 3]) -> UnitQuaternion<f64> {
+        let about = |axis: usize| {
+            let mut vector = Vector3::zeros();
+            vector[axis] = angles[axis];
+            rotation_from_vector(&vector)
+        };
+        match self {
+            Euler::Vector => rotation_from_vector(&Vector3::from(angles)),
+            Euler::Turns { axes: [a, b, c], moving: true } => about(a) * about(b) * about(c),
+            Euler::Turns { axes: [a, b, c], moving: false } => about(c) * about(b) * about(a),
+        }
+    }
+}
 
 /// Reads the table at `path`.
 ///
 /// # Errors
 /// If it cannot be read, or names the line and what is wrong with it.
 pub fn read(path: impl AsRef<Path>) -> Result<Table, TableError> {
+    read_as(path, &Reading::default())
+}
+
+/// The same with what is known of it.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_as(path: impl AsRef<Path>, reading: &Reading) -> Result<Table, TableError> {
     let path = path.as_ref();
     let file = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|source| TableError::Unreadable { file: file.clone(), source })?;
-    parse(&text, &file)
+    let unreadable = |source: std::io::Error| TableError::Unreadable { file: file.clone(), source };
+    let about = std::fs::metadata(path).map_err(unreadable)?;
+    if !about.is_file() {
+        return Err(unreadable(std::io::Error::other("it is no regular file")));
+    }
+    if about.len() > text::LARGEST_FILE {
+        let message = format!("it has {} MB, and {} are allowed", about.len() >> 20, text::LARGEST_FILE >> 20);
+        return Err(unreadable(std::io::Error::other(message)));
+    }
+    let bytes = std::fs::read(path).map_err(unreadable)?;
+    let decoded = text::decoded(&bytes).map_err(|(line, message)| TableError::Wrong { file: file.clone(), line, message })?;
+    parse_as(&decoded, &file, reading)
 }
 
 /// Reads a table from `text`; `file` is its name in messages.
@@ -187,21 +260,63 @@ pub fn read(path: impl AsRef<Path>) -> Result<Table, TableError> {
 /// # Errors
 /// Names the line and what is wrong with it.
 pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
+    parse_as(text, file, &Reading::default())
+}
+
+/// Largest share of the rows that may be without a reading.
+const MOST_EMPTY: f64 = 0.5;
+/// Lines that are named, at most.
+const NAMED: usize = 8;
+/// Times (s) beyond this are since 1970.
+const SINCE_1970: f64 = 1e8;
+
+/// The same with what is known of it.
+///
+/// # Errors
+/// As [`parse`].
+pub fn parse_as(text: &str, file: &str, reading: &Reading) -> Result<Table, TableError> {
     let wrong = |line, message| TableError::Wrong { file: file.to_owned(), line, message };
-    let mut reader =
-        csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).flexible(true).from_reader(text.as_bytes());
+    let layout = text::layout(text);
+    let mut reader = csv::ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .delimiter(layout.separator)
+        .trim(csv::Trim::All)
+        .flexible(true)
+        .from_reader(text.as_bytes());
     let header = reader.headers().map_err(|error| wrong(1, error.to_string()))?.clone();
     let header_line = header.position().map_or(1, csv::Position::line);
-    let columns =
-        header.iter().map(|name| column(name).map_err(|message| wrong(header_line, message))).collect::<Result<Vec<_>, _>>()?;
-    let layout = Layout::new(&columns, &header).map_err(|message| wrong(header_line, message))?;
+    let (names, slides): (Vec<String>, Vec<bool>) = reading.joints.iter().cloned().unzip();
+    // A separator at the end of every line makes a column without a name.
+    let trailing = header.len() > 1 && header.iter().next_back() == Some("");
+    let header: csv::StringRecord = if trailing { header.iter().take(header.len() - 1).collect() } else { header };
+    let understood = Header::new(&header, &names, &slides, &reading.ignored).map_err(|message| wrong(header_line, message))?;
+    let Header { columns, notes, .. } = &understood;
+    let euler = match (understood.orientation, reading.euler) {
+        (Orientation::Euler, None) => {
+            let message = "three angles make an orientation in many ways: say with --euler which, such as rpy (URDF, ROS), abc (KUKA), wpr \
+                           (FANUC), rotvec (Universal Robots) or ZYX";
+            return Err(wrong(header_line, message.to_owned()));
+        }
+        (_, euler) => euler.unwrap_or(Euler::Vector),
+    };
+    let per_turn = reading.ticks_per_turn.unwrap_or(1.0);
+    if reading.ticks_per_turn.is_none() && columns.iter().any(|column| matches!(column, Column::Ticks { .. })) {
+        return Err(wrong(header_line, "columns of encoder ticks: say with --ticks-per-turn how many there are per turn of the joint".to_owned()));
+    }
+    let mut notes = notes.clone();
+    let mut empty: Vec<(u64, String)> = Vec::new();
 
     let mut measurements: Vec<Measurement> = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|error| wrong(error.position().map_or(0, csv::Position::line), error.to_string()))?;
         let line = record.position().map_or(0, csv::Position::line);
-        if record.len() != columns.len() {
-            let message = format!("{} values, but the header names {} columns", record.len(), columns.len());
+        let beyond = record.iter().skip(columns.len()).any(|cell| !cell.is_empty());
+        if record.len() < columns.len() || beyond {
+            let message = format!(
+                "{} values, but the header names {} columns: give each column a value, or leave the row out",
+                record.len(),
+                columns.len()
+            );
             return Err(wrong(line, message));
         }
         let index = measurements.len();
@@ -210,21 +325,29 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
             pose_id: index,
             role: Role::Fit,
             time_s: index as f64,
-            joints: vec![0.0; layout.joints],
-            temperatures_c: vec![0.0; layout.sensors],
+            joints: vec![0.0; understood.joints],
+            temperatures_c: vec![0.0; understood.sensors],
             position_m: [0.0; 3],
-            unread: layout.read.map(|read| !read),
-            orientation_xyzw: layout.orientation.then_some([0.0; 4]),
-            approach: vec![0; layout.approaches],
+            unread: understood.read.map(|read| !read),
+            orientation_xyzw: (understood.orientation != Orientation::None).then_some([0.0; 4]),
+            approach: vec![0; understood.approaches],
             ..Measurement::default()
         };
+        let (mut angles, mut matrix) = ([0.0; 3], Matrix3::zeros());
+        let mut missing: Option<String> = None;
         for ((column, text), name) in columns.iter().zip(record.iter()).zip(header.iter()) {
-            let number = || match text.parse::<f64>() {
+            let reads = matches!(column, Column::Joint { .. } | Column::Ticks { .. } | Column::Quaternion { .. } | Column::Euler { .. } | Column::Matrix { .. });
+            if reads && text::is_missing(text) {
+                missing.get_or_insert_with(|| name.to_owned());
+                continue;
+            }
+            let point = layout.number(text);
+            let number = || match point.parse::<f64>() {
                 Ok(value) if value.abs() <= LARGEST => Ok(value),
                 Ok(value) if value.is_finite() => {
-                    Err(wrong(line, format!("`{name}` is `{text}`; at most {LARGEST} is allowed: check the number")))
+                    Err(wrong(line, format!("`{name}` is `{}`; at most {LARGEST} is allowed: check the number", short(text))))
                 }
-                _ => Err(wrong(line, format!("`{name}` is `{text}`; a finite number is needed"))),
+                _ => Err(wrong(line, format!("`{name}` is `{}`; a finite number is needed", short(text)))),
             };
             match column {
                 Column::PoseId => {
@@ -232,9 +355,21 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
                         .parse()
                         .map_err(|_| wrong(line, format!("`pose_id` is `{text}`; a whole number from 0 is needed")))?;
                 }
-                Column::Time => row.time_s = number()?,
+                Column::Ignored => {}
+                Column::Time { factor } => {
+                    row.time_s = match point.parse::<f64>() {
+                        Ok(value) if value.is_finite() => value * factor,
+                        Ok(_) => number()?,
+                        Err(_) => moment(text).ok_or_else(|| {
+                            wrong(line, format!("`{name}` is `{}`; seconds, or a date and time such as 2026-05-01T12:30:00.5 are needed", short(text)))
+                        })?,
+                    }
+                }
                 Column::Joint { joint, factor, .. } => row.joints[*joint] = number()? * factor,
-                Column::Position { axis, .. } if text.is_empty() => row.unread[*axis] = true,
+                Column::Ticks { joint } => row.joints[*joint] = number()? / per_turn * 2.0 * std::f64::consts::PI,
+                Column::Euler { axis, factor } => angles[*axis] = number()? * factor,
+                Column::Matrix { row, column } => matrix[(*row, *column)] = number()?,
+                Column::Position { axis, .. } if text::is_missing(text) => row.unread[*axis] = true,
                 Column::Position { axis, factor } => row.position_m[*axis] = number()? * factor,
                 Column::Quaternion { component } => {
                     let value = number()?;
@@ -284,6 +419,10 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
                 }
             }
         }
+        if let Some(name) = missing {
+            empty.push((line, name));
+            continue;
+        }
         if let Some(read) = row.gravity_m_s2 {
             row.gravity_m_s2 = Some(free_fall(read).map_err(|what| wrong(line, what))?);
         }
@@ -297,7 +436,20 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
             row.unread = [false; 3];
         }
         if row.unread == [true; 3] {
-            return Err(wrong(line, "none of x, y, z was read; leave the row out".to_owned()));
+            empty.push((line, "x, y, z".to_owned()));
+            continue;
+        }
+        match understood.orientation {
+            Orientation::Euler => row.orientation_xyzw = Some(euler.turn(angles).coords.into()),
+            Orientation::Matrix => {
+                let off = (matrix * matrix.transpose() - Matrix3::identity()).amax();
+                if off > 1e-3 || matrix.determinant() < 0.0 {
+                    return Err(wrong(line, format!("r11 … r33 are no rotation: their product with their transpose is off one by {off:.3}, or they mirror")));
+                }
+                let rotation = Rotation3::from_matrix_eps(&matrix, 1e-15, 100, Rotation3::identity());
+                row.orientation_xyzw = Some(UnitQuaternion::from_rotation_matrix(&rotation).coords.into());
+            }
+            Orientation::None | Orientation::Quaternion => {}
         }
         if let Some(quaternion) = &mut row.orientation_xyzw {
             let norm = quaternion.iter().map(|component| component * component).sum::<f64>().sqrt();
@@ -311,22 +463,39 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
         }
         measurements.push(row);
     }
-    if measurements.is_empty() {
+    if measurements.is_empty() && empty.is_empty() {
         return Err(wrong(header_line, "the table has a header but no rows".to_owned()));
+    }
+    if let Some((line, name)) = empty.first() {
+        let total = measurements.len() + empty.len();
+        if empty.len() as f64 > MOST_EMPTY * total as f64 {
+            let message = format!("`{name}` has no number here, and {} of {total} rows lack some: is it the right column?", empty.len());
+            return Err(wrong(*line, message));
+        }
+        let said: Vec<String> = empty.iter().take(NAMED).map(|(line, name)| format!("{line} ({name})")).collect();
+        let more = if empty.len() > NAMED { format!(" and {} more", empty.len() - NAMED) } else { String::new() };
+        let plural = if empty.len() == 1 { "row without a reading is" } else { "rows without a reading are" };
+        notes.push(format!("{} {plural} left out: line {}{more}", empty.len(), said.join(", ")));
+    }
+    let first = measurements.iter().map(|row| row.time_s).fold(f64::INFINITY, f64::min);
+    if first > SINCE_1970 {
+        // Since the first reading: seconds since 1970 would lose their fractions.
+        measurements.iter_mut().for_each(|row| row.time_s -= first);
     }
     let is_condition = |column: &Column| {
         use Column::{Ambient, Approach, Dwell, Gravity, Payload, Session, Target};
         matches!(column, Approach { .. } | Gravity { .. } | Ambient | Payload | Dwell | Session | Target)
     };
     let conditions =
-        header.iter().zip(&columns).filter(|(_, column)| is_condition(column)).map(|(name, _)| name.to_owned()).collect();
-    let mut joint_is_length = vec![false; layout.joints];
-    let (mut joint_factor, mut position_factor) = (vec![1.0; layout.joints], [1.0; 3]);
-    for column in &columns {
+        header.iter().zip(columns).filter(|(_, column)| is_condition(column)).map(|(name, _)| name.to_owned()).collect();
+    let mut joint_is_length = vec![false; understood.joints];
+    let (mut joint_factor, mut position_factor) = (vec![1.0; understood.joints], [1.0; 3]);
+    for column in columns {
         match column {
             Column::Joint { joint, is_length, factor } => {
                 (joint_is_length[*joint], joint_factor[*joint]) = (*is_length, *factor);
             }
+            Column::Ticks { joint } => joint_factor[*joint] = 2.0 * std::f64::consts::PI / per_turn,
             Column::Position { axis, factor } => position_factor[*axis] = *factor,
             _ => {}
         }
@@ -336,7 +505,20 @@ pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
         said.is_some_and(|said| said == "order:unknown")
     };
     let in_order = !text.lines().any(is_unknown);
-    Ok(Table { measurements, joint_is_length, joint_factor, position_factor, conditions, in_order })
+    Ok(Table { measurements, joint_is_length, joint_factor, position_factor, conditions, in_order, notes })
+}
+
+/// A date and time as seconds since 1970; without a zone it is taken as UTC.
+fn moment(text: &str) -> Option<f64> {
+    let seconds = |stamp: jiff::Timestamp| stamp.as_second() as f64 + f64::from(stamp.subsec_nanosecond()) * 1e-9;
+    let zoned = text.parse::<jiff::Timestamp>().ok();
+    let plain = || text.parse::<jiff::civil::DateTime>().ok()?.to_zoned(jiff::tz::TimeZone::UTC).ok();
+    zoned.or_else(|| Some(plain()?.timestamp())).map(seconds)
+}
+
+/// The beginning of a cell, for messages.
+fn short(text: &str) -> String {
+    text.chars().take(60).collect()
 }
 
 fn not_negative(value: f64) -> Result<f64, String> {
@@ -421,167 +603,6 @@ pub fn write_configurations(configurations: &[Vec<f64>], slides: &[bool]) -> Res
     }
     let bytes = writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
-}
-
-struct Layout {
-    joints: usize,
-    sensors: usize,
-    approaches: usize,
-    orientation: bool,
-    /// Which of x, y, z have a column.
-    read: [bool; 3],
-}
-
-impl Layout {
-    fn new(columns: &[Column], header: &csv::StringRecord) -> Result<Layout, String> {
-        for (index, name) in header.iter().enumerate() {
-            if header.iter().take(index).any(|other| other == name) {
-                return Err(format!("column `{name}` stands there twice"));
-            }
-        }
-        let joints = numbered(columns, |column| match column {
-            Column::Joint { joint, .. } => Some(*joint),
-            _ => None,
-        })
-        .map_err(|missing| {
-            format!("joint columns must be q1, q2, … without a gap, each once: q{} is missing or doubled", missing + 1)
-        })?;
-        if joints == 0 {
-            return Err("no joint columns; q1_rad, q2_rad, … (or _deg, _m, _mm) are needed".to_owned());
-        }
-        let columns_of =
-            |axis: usize| columns.iter().filter(|of| matches!(of, Column::Position { axis: its, .. } if *its == axis)).count();
-        let of_axes = [0, 1, 2].map(columns_of);
-        let is_fixed = columns.iter().any(|column| matches!(column, Column::FixedPoint));
-        if (of_axes == [0; 3] && !is_fixed) || of_axes.iter().any(|count| *count > 1) {
-            return Err("the measured position needs x_m, y_m, z_m (or _mm), those that were read, each once; or fixed_point, a label of the \
-                        unknown place at which the target was"
-                .to_owned());
-        }
-        let components = numbered(columns, |column| match column {
-            Column::Quaternion { component } => Some(*component),
-            _ => None,
-        });
-        let orientation = match components {
-            Ok(0) => false,
-            Ok(4) => true,
-            _ => return Err("an orientation needs all of qx, qy, qz, qw".to_owned()),
-        };
-        let sensors = numbered(columns, |column| match column {
-            Column::Temperature { sensor } => Some(*sensor),
-            _ => None,
-        })
-        .map_err(|missing| {
-            format!("temperature columns must be temp1_c, temp2_c, … without a gap: temp{}_c is missing", missing + 1)
-        })?;
-        let approaches = numbered(columns, |column| match column {
-            Column::Approach { joint } => Some(*joint),
-            _ => None,
-        });
-        let approaches = match approaches {
-            Ok(0) => 0,
-            Ok(count) if count == joints => count,
-            _ => return Err(format!("directions of approach need approach1 … approach{joints}: one column per joint, or none")),
-        };
-        let axes = numbered(columns, |column| match column {
-            Column::Gravity { axis } => Some(*axis),
-            _ => None,
-        });
-        if !matches!(axes, Ok(0 | 3)) {
-            return Err("gravity needs all of gravity_x, gravity_y, gravity_z (m/s²), or none".to_owned());
-        }
-        Ok(Layout { joints, sensors, approaches, orientation, read: of_axes.map(|count| count == 1) })
-    }
-}
-
-/// How many of 0, 1, 2, … occur, each once; the first that does not otherwise.
-fn numbered(columns: &[Column], number: impl Fn(&Column) -> Option<usize>) -> Result<usize, usize> {
-    let mut numbers: Vec<usize> = columns.iter().filter_map(number).collect();
-    numbers.sort_unstable();
-    match numbers.iter().enumerate().find(|(index, number)| index != *number) {
-        Some((missing, _)) => Err(missing),
-        None => Ok(numbers.len()),
-    }
-}
-
-fn column(name: &str) -> Result<Column, String> {
-    const DEGREE: f64 = std::f64::consts::PI / 180.0;
-    let fixed = match name {
-        "pose_id" => Some(Column::PoseId),
-        "time_s" => Some(Column::Time),
-        "role" => Some(Column::Role),
-        "target" => Some(Column::Target),
-        "fixed_point" => Some(Column::FixedPoint),
-        "temp_ambient_c" => Some(Column::Ambient),
-        "payload_kg" => Some(Column::Payload),
-        "dwell_s" => Some(Column::Dwell),
-        "session" => Some(Column::Session),
-        _ => None,
-    };
-    if let Some(column) = fixed {
-        return Ok(column);
-    }
-    if let Some(component) = ["qx", "qy", "qz", "qw"].iter().position(|known| *known == name) {
-        return Ok(Column::Quaternion { component });
-    }
-    let bare = name.strip_suffix("_m_s2").unwrap_or(name);
-    if let Some(axis) = ["gravity_x", "gravity_y", "gravity_z"].iter().position(|known| *known == bare) {
-        return Ok(Column::Gravity { axis });
-    }
-    let unknown = || {
-        Err(match name {
-            "" => "a column without a name: is there a comma at the end of the line?".to_owned(),
-            _ if name.contains([';', '\t']) => {
-                "the columns are separated by semicolons or tabs: separate them by commas, with decimal \
-                 points"
-                    .to_owned()
-            }
-            _ if name.parse::<f64>().is_ok() => {
-                format!("a number (`{name}`) where the names of the columns should be: the header is missing")
-            }
-            _ if name != name.to_lowercase() && column(&name.to_lowercase()).is_ok() => {
-                format!("unknown column `{name}`; write `{}`", name.to_lowercase())
-            }
-            _ => format!("unknown column `{name}`: rename it, or take it out; known are {ALLOWED}"),
-        })
-    };
-    if name.is_empty() || name.contains([';', '\t']) || name.parse::<f64>().is_ok() {
-        return unknown();
-    }
-    if let Some(axis) = ["x", "y", "z"].iter().position(|axis| name == *axis || name.starts_with(&format!("{axis}_"))) {
-        return match &name[1..] {
-            "_m" => Ok(Column::Position { axis, factor: 1.0 }),
-            "_mm" => Ok(Column::Position { axis, factor: 1e-3 }),
-            _ => Err(format!("column `{name}` has no known unit; write {0}_m or {0}_mm", &name[..1])),
-        };
-    }
-    if let Some(rest) = name.strip_prefix("approach") {
-        return match rest.parse() {
-            Ok(joint @ 1..=1000) => Ok(Column::Approach { joint: joint - 1 }),
-            _ => unknown(),
-        };
-    }
-    if let Some(rest) = name.strip_prefix("temp") {
-        return match rest.strip_suffix("_c").and_then(|number| number.parse().ok()) {
-            Some(sensor @ 1..=1000) => Ok(Column::Temperature { sensor: sensor - 1 }),
-            _ => unknown(),
-        };
-    }
-    let Some(rest) = name.strip_prefix('q') else {
-        return unknown();
-    };
-    let digits = rest.chars().take_while(char::is_ascii_digit).count();
-    let Some(joint) = rest[..digits].parse::<usize>().ok().filter(|joint| (1..=1000).contains(joint)) else {
-        return unknown();
-    };
-    let factor = match &rest[digits..] {
-        "_rad" | "_m" => 1.0,
-        "_deg" => DEGREE,
-        "_mm" => 1e-3,
-        _ => return Err(format!("column `{name}` has no known unit; write q{joint}_rad, _deg, _m or _mm")),
-    };
-    let is_length = matches!(&rest[digits..], "_m" | "_mm");
-    Ok(Column::Joint { joint: joint - 1, factor, is_length })
 }
 
 #[cfg(test)]
