@@ -5,6 +5,8 @@
 
 #[path = "integration/bad_input.rs"]
 mod bad_input;
+#[path = "integration/cases.rs"]
+mod cases;
 #[path = "integration/chain.rs"]
 mod chain;
 #[path = "integration/challenge.rs"]

@@ -6,6 +6,7 @@
 //! URDF's joint origins ([`urdf`]) are all such lists, so one forward kinematics and one Jacobian serve them all.
 
 pub mod frames;
+pub mod inverse;
 pub mod parameters;
 
 pub mod chain;

@@ -79,6 +79,12 @@ pub(crate) enum Command {
         and more than a fifth of the noise floor), its held-out RMS differs from theirs by more than that, or stays above the\n\
         diagnosis' own by more than half of it.")]
     Diagnose(DiagnoseOptions),
+    /// Joint angles at which a calibrated robot reaches wanted poses
+    #[command(after_help = "Example:\n  kincal correct --robot recordings/cell-identified.urdf --targets poses.csv\n\n\
+        The table has x_mm, y_mm, z_mm (or _m) of the tip in the root's frame, and qx, qy, qz, qw or three angles (--euler) where orientations\n\
+        count; joint columns say where each pose is looked for, else it is the nearest to the one before. A robot that was calibrated with\n\
+        --with-frames takes poses of the target in the measurement frame. Exit code 1: a pose is out of reach.")]
+    Correct(CorrectOptions),
     /// Recompute a recording and compare bit for bit
     #[command(after_help = "Examples:\n  kincal replay recordings/arm8.mcap\n  \
         kincal replay recordings/arm8.mcap --truth recordings/arm8.truth.toml\n  \
@@ -325,6 +331,28 @@ pub(crate) struct RobotOptions {
     /// Gravity in the robot's root link, m/s²: 9.81,0,0 for a robot on a wall, 0,0,9.81 for one that hangs [default: as the file has it]
     #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_negative_numbers = true)]
     pub(crate) gravity: Vec<f64>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CorrectOptions {
+    /// Calibrated robot (URDF)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) robot: PathBuf,
+    /// Wanted poses (.csv)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) targets: PathBuf,
+    /// Link in whose frame the poses are given [default: the root]
+    #[arg(long, value_name = "LINK")]
+    pub(crate) base_link: Option<String>,
+    /// Link that is to be there [default: the only leaf]
+    #[arg(long, value_name = "LINK")]
+    pub(crate) tip_link: Option<String>,
+    /// How three angles make an orientation, as for `kincal identify`
+    #[arg(long, value_name = "CONVENTION")]
+    pub(crate) euler: Option<String>,
+    /// Columns that are not to be read
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub(crate) ignore_columns: Vec<String>,
 }
 
 #[derive(Debug, Args)]

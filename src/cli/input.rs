@@ -151,6 +151,7 @@ pub(crate) fn read_table(path: &Path, arm: &Arm, options: &RobotOptions) -> anyh
         euler,
         ticks_per_turn: options.ticks_per_turn,
         ignored: options.ignore_columns.clone(),
+        poses_only: false,
     };
     let mut table = table::read_as(path, &reading)?;
     if !options.gravity.is_empty() {

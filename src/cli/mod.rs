@@ -5,6 +5,7 @@
 mod arguments;
 mod bar;
 mod challenge;
+mod correct;
 mod design;
 mod diagnose;
 mod effects;
@@ -74,7 +75,7 @@ fn dispatch(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if let Some(threads) = global.threads {
         rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global()?;
     }
-    if let (Some(seed), Command::Diagnose(_) | Command::Identify(_) | Command::Replay(_) | Command::Export(_)) =
+    if let (Some(seed), Command::Correct(_) | Command::Diagnose(_) | Command::Identify(_) | Command::Replay(_) | Command::Export(_)) =
         (global.seed, &arguments.command)
     {
         ensure!(
@@ -87,6 +88,7 @@ fn dispatch(arguments: &Arguments) -> anyhow::Result<Outcome> {
         Command::Run(options) => run::command(global, options),
         Command::Design(options) => design::command(global, options),
         Command::Measure(options) => measure::command(global, options),
+        Command::Correct(options) => correct::command(global, options),
         Command::Diagnose(options) => diagnose::command(global, options),
         Command::Identify(options) => identify::command(global, options),
         Command::Replay(options) => replay::command(global, options),

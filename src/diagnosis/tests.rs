@@ -393,9 +393,9 @@ fn what_a_table_got_wrong_is_named() {
     };
     says(&|row| row.joints.swap(3, 5), "--fix-columns order:1,2,3,6,5,4,7,8");
     says(&|row| row.joints[4] = -row.joints[4], "--fix-columns reverse:5");
-    says(&|row| row.joints[3] = 0.3, "The readings of joint 4 never change");
-    says(&|row| row.joints.iter_mut().for_each(|joint| *joint *= 57.295_779_5), "the joint angles were degrees");
-    says(&|row| row.position_m = row.position_m.map(|value| value * 1e-3), "the positions were metres");
+    says(&|row| row.joints[3] = 0.3, "never change: was the arm");
+    says(&|row| row.joints.iter_mut().for_each(|joint| *joint *= 57.295_779_5), "--fix-columns angles:deg");
+    says(&|row| row.position_m = row.position_m.map(|value| value * 1e-3), "--fix-columns positions:1000");
     says(&|row| row.joints = vec![0.1; 8], "1 different configurations");
 }
 

@@ -38,6 +38,8 @@ pub enum Fix {
     Angles(&'static str),
     /// Positions are in this unit, whatever the columns say.
     Positions(&'static str),
+    /// Positions are to be multiplied by this.
+    Scale(f64),
     /// Of one axis.
     PositionsOf(usize, &'static str),
     /// x, y, z of a right-handed frame are these columns, with these signs; of positions alone.
@@ -141,6 +143,7 @@ impl Fix {
                     (0..3).for_each(|axis| row.position_m[axis] *= unit / said.position[axis]);
                 }
             }
+            Fix::Scale(factor) => rows.iter_mut().for_each(|row| row.position_m = row.position_m.map(|value| value * factor)),
             Fix::PositionsOf(axis, name) => {
                 let unit = unit(&LENGTHS, name).map_or(1.0, |(_, unit)| unit);
                 rows.iter_mut().for_each(|row| row.position_m[*axis] *= unit / said.position[*axis]);
@@ -236,6 +239,8 @@ impl Fix {
             ),
             Fix::Angles(unit) => format!("the joint angles are {}, whatever the columns say", spelt(unit)),
             Fix::Positions(unit) => format!("the positions are {}, whatever the columns say", spelt(unit)),
+            Fix::Scale(factor) if *factor > 1.0 => format!("the positions are {factor} times too small"),
+            Fix::Scale(factor) => format!("the positions are {} times too large", (1e4 / factor).round() / 1e4),
             Fix::PositionsOf(axis, unit) => {
                 format!("{} of the positions is {}, whatever the column says", ["x", "y", "z"][*axis], spelt(unit))
             }
@@ -287,6 +292,7 @@ impl fmt::Display for Fix {
             Fix::Zero(joint, zero) => write!(f, "zero:{}={}", joint + 1, (zero.to_degrees() * 1e4).round() / 1e4),
             Fix::Angles(unit) => write!(f, "angles:{unit}"),
             Fix::Positions(unit) => write!(f, "positions:{unit}"),
+            Fix::Scale(factor) => write!(f, "positions:{factor}"),
             Fix::PositionsOf(axis, unit) => write!(f, "{}:{unit}", ["x", "y", "z"][*axis]),
             Fix::Axes(axes) => {
                 let one = |(axis, sign): &(usize, f64)| format!("{}{}", if *sign < 0.0 { "-" } else { "" }, ["x", "y", "z"][*axis]);
@@ -303,7 +309,7 @@ impl fmt::Display for Fix {
 
 /// What can be written.
 pub const GRAMMAR: &str = "order:1,2,4,5,3,6 (which joint each column holds), reverse:2,5, couple:3+2 (column 3 holds joint 3 plus joint 2), \
-                           factor:4=0.5, zero:3=90 (degrees to be added), angles:deg, positions:inch, z:cm, axes:x,-y,z, pose:inverse, \
+                           factor:4=0.5, zero:3=90 (degrees to be added), angles:deg, positions:inch, positions:39.37 (a factor), z:cm, axes:x,-y,z, pose:inverse, \
                            quaternion:wxyz, quaternion:conjugate, shift:31=+2 (from reading 31 on, a pose belongs to the joints two rows \
                            further down), drop:5,17";
 
@@ -340,7 +346,10 @@ impl FromStr for Fix {
                 Fix::Zero(joint, finite(value)?.to_radians())
             }
             "angles" => Fix::Angles(of_unit(&ANGLES)?),
-            "positions" => Fix::Positions(of_unit(&LENGTHS)?),
+            "positions" => match how.parse::<f64>() {
+                Ok(factor) if factor.is_finite() && factor > 0.0 => Fix::Scale(factor),
+                _ => Fix::Positions(of_unit(&LENGTHS)?),
+            },
             "x" | "y" | "z" => Fix::PositionsOf(["x", "y", "z"].iter().position(|axis| *axis == what).unwrap_or(0), of_unit(&LENGTHS)?),
             "axes" => {
                 let axis = |text: &str| {
@@ -390,6 +399,7 @@ mod tests {
             "zero:3=-90",
             "angles:deg",
             "positions:inch",
+            "positions:39.37",
             "z:cm",
             "axes:x,-y,z",
             "pose:inverse",

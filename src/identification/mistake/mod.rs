@@ -137,8 +137,12 @@ pub fn explanations(arm: &Arm, said: &Said, rows: &[&Measurement]) -> Vec<Explan
     let mut beam = vec![start.clone()];
     // Conventions of the whole table go together with what is wrong of joints.
     beam.extend(best_of(found.iter().filter(|trial| !trial.rows.is_empty()).cloned().collect(), BEAM));
+    // Two mistakes may hide each other: neither alone helps. Of every one that is a choice among few, every second is tried.
+    let mut singles: Vec<Trial> = Vec::new();
     for size in 0..MOST {
-        found.extend(beam.par_iter().flat_map_iter(|trial| search.of_joints(trial)).collect::<Vec<_>>());
+        found.extend(beam.par_iter().flat_map_iter(|trial| search.of_joints(trial, true)).collect::<Vec<_>>());
+        found.extend(singles.par_iter().flat_map_iter(|trial| search.of_joints(trial, false)).collect::<Vec<_>>());
+        singles = if size == 0 { found.iter().filter(|trial| trial.fixes.iter().all(Fix::is_plain)).cloned().collect() } else { Vec::new() };
         let good: Vec<Trial> = found.iter().filter(|trial| enough(&trial.left)).cloned().collect();
         if !good.is_empty() {
             return said_of(good, &search);
@@ -229,10 +233,21 @@ fn joined(fixes: Vec<Fix>, joints: usize) -> Vec<Fix> {
 }
 
 impl Fix {
+    /// Whether it is a choice among few about joints.
+    fn is_plain(&self) -> bool {
+        let quarters = |zero: f64| (zero / FRAC_PI_2 - (zero / FRAC_PI_2).round()).abs() < 1e-9;
+        match self {
+            Fix::Order(order) => order.iter().enumerate().filter(|(at, joint)| at != *joint).count() == 2,
+            Fix::Reverse(_) => true,
+            Fix::Zero(_, zero) => quarters(*zero),
+            _ => false,
+        }
+    }
+
     /// How much it takes to believe it: a number that is free to be anything counts for more.
     fn weight(&self) -> usize {
         match self {
-            Fix::Zero(..) | Fix::Factor(..) => 2,
+            Fix::Zero(..) | Fix::Factor(..) | Fix::Scale(_) => 2,
             Fix::Couple { .. } => 2,
             _ => 1,
         }
@@ -311,6 +326,7 @@ impl Search<'_> {
             }
             fixes.extend([Fix::Inverse, Fix::RealPartFirst, Fix::Conjugate]);
         }
+        fixes.extend(self.scale(start).map(Fix::Scale));
         let mut tried: Vec<Trial> = fixes.into_par_iter().filter_map(|fix| self.trial(start, fix)).collect();
         let wrong_order = tried.iter().find(|trial| trial.fixes == [Fix::RealPartFirst]).cloned();
         tried.extend(wrong_order.iter().flat_map(|trial| {
@@ -322,6 +338,30 @@ impl Search<'_> {
             tried.retain(|trial| !matches!(trial.fixes[0], Fix::Axes(_)) || !std::mem::replace(&mut mirrored, true));
         }
         tried
+    }
+
+    /// By what the positions are too small, where they are the arm's in another size.
+    fn scale(&self, start: &Trial) -> Option<f64> {
+        let read = Read::of(&start.rows);
+        let tools: Vec<Pose> = read.joints.iter().map(|joints| self.chain.forward(joints)).collect();
+        let mut factor = 1.0;
+        for _ in 0..ROUNDS {
+            let positions: Vec<Vector3<f64>> = read.positions.iter().map(|position| position * factor).collect();
+            let found = standing::in_turn_of(&tools, &positions, ROUNDS)?;
+            let [base, target] = [found.measurement_from_root, found.tool_from_target[0]];
+            let ours: Vec<Vector3<f64>> = tools.iter().map(|tool| (base * tool * target).translation.vector).collect();
+            let middle = |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+            let (our_middle, their_middle) = (middle(&ours), middle(&positions));
+            let both = ours.iter().zip(&positions).map(|(ours, theirs)| (ours - our_middle, theirs - their_middle));
+            let (with, own) = both.fold((0.0, 0.0), |(with, own), (ours, theirs)| (with + ours.dot(&theirs), own + theirs.norm_squared()));
+            // Of our own points on theirs: what is not explained makes it no smaller.
+            factor *= with / own;
+            if !(factor.is_finite() && factor > 0.0) {
+                return None;
+            }
+        }
+        let digits = 10f64.powf(3.0 - factor.log10().floor());
+        Some((factor * digits).round() / digits).filter(|factor| (factor - 1.0).abs() > 0.05)
     }
 
     /// Every order of the columns, where that is not too many.
@@ -342,8 +382,8 @@ impl Search<'_> {
         best.into_iter().filter_map(|trial| self.trial(start, trial.fixes.into_iter().next()?)).collect()
     }
 
-    /// `trial` with one more mistake about joints.
-    fn of_joints(&self, trial: &Trial) -> Vec<Trial> {
+    /// `trial` with one more mistake about joints; all of them, or those that are a choice among few.
+    fn of_joints(&self, trial: &Trial, all: bool) -> Vec<Trial> {
         let count = self.slides.len();
         let touched = |joint: usize| {
             trial.fixes.iter().any(|fix| matches!(fix, Fix::Zero(of, _) | Fix::Factor(of, _) if *of == joint))
@@ -359,6 +399,12 @@ impl Search<'_> {
                 order.swap(joint, other);
                 add(Fix::Order(order));
             }
+            if !touched(joint) && !self.slides[joint] {
+                [FRAC_PI_2, PI, -FRAC_PI_2].into_iter().for_each(|zero| add(Fix::Zero(joint, zero)));
+            }
+            if !all {
+                continue;
+            }
             for other in (0..count).filter(|other| *other != joint && self.slides[*other] == self.slides[joint]) {
                 add(Fix::Couple { joint, other, sign: 1.0 });
                 add(Fix::Couple { joint, other, sign: -1.0 });
@@ -370,7 +416,7 @@ impl Search<'_> {
                 add(Fix::Factor(joint, factor));
             }
         }
-        for joint in (0..count).filter(|joint| !touched(*joint) && !self.slides[*joint]) {
+        for joint in (0..count).filter(|_| all).filter(|joint| !touched(*joint) && !self.slides[*joint]) {
             tried.extend(self.zero(trial, joint));
         }
         tried

@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use super::Reading;
+
 /// What a column is about.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Column {
@@ -206,11 +208,12 @@ fn plain(name: &str) -> Option<Column> {
 }
 
 impl Header {
-    /// Understands `names`, for a robot whose joints are called `joints`; `slides` of these, `ignored` columns are left out.
+    /// Understands `names`, for a robot whose joints are called `joints`; `slides` of these.
     ///
     /// # Errors
     /// What is wrong, and what is allowed.
-    pub(super) fn new(names: &csv::StringRecord, joints: &[String], slides: &[bool], ignored: &[String]) -> Result<Header, String> {
+    pub(super) fn new(names: &csv::StringRecord, joints: &[String], slides: &[bool], reading: &Reading) -> Result<Header, String> {
+        let ignored = &reading.ignored;
         for (index, name) in names.iter().enumerate() {
             if !name.is_empty() && names.iter().take(index).any(|other| other == name) {
                 return Err(format!("column `{name}` stands there twice"));
@@ -255,10 +258,10 @@ impl Header {
         if from_zero {
             notes.push("joint columns are numbered from 0: the first joint is number 0 in the table, and 1 here".to_owned());
         }
-        Header::laid_out(columns, notes)
+        Header::laid_out(columns, notes, reading.poses_only)
     }
 
-    fn laid_out(columns: Vec<Column>, notes: Vec<String>) -> Result<Header, String> {
+    fn laid_out(columns: Vec<Column>, notes: Vec<String>, poses_only: bool) -> Result<Header, String> {
         let joints = numbered(&columns, |column| match column {
             Column::Joint { joint, .. } | Column::Ticks { joint } => Some(*joint),
             _ => None,
@@ -266,7 +269,7 @@ impl Header {
         .map_err(|missing| {
             format!("joint columns must be q1, q2, … without a gap, each once: q{} is missing or doubled", missing + 1)
         })?;
-        if joints == 0 {
+        if joints == 0 && !poses_only {
             return Err("no joint columns; q1_rad, q2_rad, … (or _deg, _m, _mm) are needed".to_owned());
         }
         let columns_of =
@@ -361,8 +364,9 @@ mod tests {
     use super::*;
 
     fn header(names: &[&str]) -> Result<Header, String> {
+        let ignored = names.iter().filter(|name| **name == "note").map(|name| (*name).to_owned()).collect();
         let joints = ["shoulder_pan_joint".to_owned(), "elbow_joint".to_owned()];
-        Header::new(&csv::StringRecord::from(names.to_vec()), &joints, &[false, false], &["note".to_owned()][..usize::from(names.contains(&"note"))])
+        Header::new(&csv::StringRecord::from(names.to_vec()), &joints, &[false, false], &Reading { ignored, ..Reading::default() })
     }
 
     #[test]

@@ -171,6 +171,8 @@ pub struct Reading {
     pub ticks_per_turn: Option<f64>,
     /// Columns that are not to be read.
     pub ignored: Vec<String>,
+    /// Whether it is a table of poses, which needs no joints.
+    pub poses_only: bool,
 }
 
 /// How three numbers make an orientation.
@@ -289,7 +291,7 @@ pub fn parse_as(text: &str, file: &str, reading: &Reading) -> Result<Table, Tabl
     // A separator at the end of every line makes a column without a name.
     let trailing = header.len() > 1 && header.iter().next_back() == Some("");
     let header: csv::StringRecord = if trailing { header.iter().take(header.len() - 1).collect() } else { header };
-    let understood = Header::new(&header, &names, &slides, &reading.ignored).map_err(|message| wrong(header_line, message))?;
+    let understood = Header::new(&header, &names, &slides, reading).map_err(|message| wrong(header_line, message))?;
     let Header { columns, notes, .. } = &understood;
     let euler = match (understood.orientation, reading.euler) {
         (Orientation::Euler, None) => {
@@ -680,22 +682,64 @@ mod tests {
     }
 
     #[test]
+    fn tables_are_read_as_people_have_them() {
+        let plain = parse("q1_deg,q2_deg,x_mm,y_mm,z_mm,time_s\n10.5,-3,1,2,3,0\n11,4.25,4,5,6,90.5\n", "t.csv").unwrap();
+        let german = "\u{feff}J1 [deg];J2 [deg];X (mm);Y (mm);Z (mm);Timestamp;\n\n10,5;-3;1;2;3;2026-05-01T23:59:00;\n11;4,25;4;5;6;2026-05-02T00:00:30.5;\n";
+        let found = parse(german.trim_start_matches('\u{feff}'), "t.csv").unwrap();
+        assert_eq!(found.measurements, plain.measurements);
+        // Rows without a reading are left out and named.
+        let holes = parse("q1_rad,x_m,y_m\n0,0,0\nnan,0,0\n1,,\n2,0,\n3,0,0\n4,0,0\n", "t.csv").unwrap();
+        assert_eq!(holes.measurements.iter().map(|row| row.joints[0]).collect::<Vec<_>>(), [0.0, 2.0, 3.0, 4.0]);
+        assert_eq!(holes.notes, ["2 rows without a reading are left out: line 3 (q1_rad), 4 (x, y, z)"]);
+        assert_eq!(holes.measurements[1].unread, [false, true, true]);
+    }
+
+    /// Every way to write a turn is the same turn: 0.4 about z, then 0.3 about the new y, then -0.2 about the new x.
+    #[test]
+    fn orientations_are_the_same_however_they_are_written() {
+        let [x, y, z] = [-0.2_f64, 0.3, 0.4];
+        let turn = UnitQuaternion::from_euler_angles(x, y, z);
+        let vector = turn.scaled_axis();
+        let of = |cells: String, euler: &str| {
+            let text = format!("q1_rad,x_m,rx_rad,ry_rad,rz_rad\n0,0,{cells}\n");
+            let reading = Reading { euler: Some(euler.parse().unwrap()), ..Reading::default() };
+            parse_as(&text, "t.csv", &reading).unwrap().measurements[0].orientation().unwrap()
+        };
+        for (cells, euler) in [
+            (format!("{x},{y},{z}"), "rpy"),
+            (format!("{x},{y},{z}"), "ZYX"),
+            (format!("{x},{y},{z}"), "wpr"),
+            (format!("{},{},{}", vector.x, vector.y, vector.z), "rotvec"),
+        ] {
+            assert!(of(cells, euler).angle_to(&turn) < 1e-12, "{euler}");
+        }
+        let matrix = turn.to_rotation_matrix();
+        let cells: Vec<String> = (0..9).map(|at| matrix[(at / 3, at % 3)].to_string()).collect();
+        let text = format!("q1_rad,x_m,r11,r12,r13,r21,r22,r23,r31,r32,r33\n0,0,{}\n", cells.join(","));
+        assert!(parse(&text, "t.csv").unwrap().measurements[0].orientation().unwrap().angle_to(&turn) < 1e-9);
+        assert!("zyz".parse::<Euler>().is_err() && "Xyz".parse::<Euler>().is_err());
+    }
+
+    #[test]
     fn bad_tables_are_refused_with_line_and_remedy() {
         for (text, expected) in [
             ("q1_rad,x_m,y_m,z_m\n", "line 1: the table has a header but no rows"),
-            ("q1,x_m,y_m,z_m\n0,0,0,0\n", "column `q1` has no known unit; write q1_rad, _deg, _m or _mm"),
-            ("q1_rad,x_m,y_m,z_in\n0,0,0,0\n", "column `z_in` has no known unit; write z_m or z_mm"),
+            ("q1,x_m,y_m,z_m\n0,0,0,0\n", "column `q1` has no known unit; write q1_rad, _deg, _m, _mm or _ticks"),
+            ("q1_rad,x_m,y_m,z\n0,0,0,0\n", "column `z` has no known unit; write z_m, z_mm or another length"),
             ("q1_rad,time_s\n0,0\n", "needs x_m, y_m, z_m (or _mm), those that were read"),
             ("q1_rad,x_m,x_mm\n0,0,0\n", "needs x_m, y_m, z_m (or _mm), those that were read, each once"),
-            ("q1_rad,x_m,y_m\n0,0,0\n0,,\n", "line 3: none of x, y, z was read"),
+            ("q1_rad,x_m,y_m\n0,0,0\n0,,\n0,nan,NaN\n", "line 3: `x, y, z` has no number here, and 2 of 3 rows lack some"),
+            ("q1_rad,x_m,rx_deg,ry_deg,rz_deg\n0,0,0,0,0\n", "line 1: three angles make an orientation in many ways: say with --euler"),
+            ("q1_ticks,x_m\n0,0\n", "line 1: columns of encoder ticks: say with --ticks-per-turn"),
+            ("q1_rad,x_m,fixed_point\n0,0,a\n", "line 2: a position and the fixed point `a`"),
+            ("q1_rad,x_m,r11,r12,r13,r21,r22,r23,r31,r32,r33\n0,0,1,0,0,0,1,0,0,0,-1\n", "line 2: r11 … r33 are no rotation"),
+            ("q1_rad,x_m,time\n0,0,noon\n", "line 2: `time` is `noon`; seconds, or a date and time such as"),
             ("q1_rad,q3_rad,x_m,y_m,z_m\n", "q2 is missing or doubled"),
-            ("q1_rad;x_m;y_m;z_m\n0;0;0;0\n", "line 1: the columns are separated by semicolons or tabs"),
             ("0.3,1,2,3\n", "line 1: a number (`0.3`) where the names of the columns should be"),
-            ("q1_rad,x_m,y_m,z_m,\n", "line 1: a column without a name"),
-            ("Q1_RAD,x_m,y_m,z_m\n", "line 1: unknown column `Q1_RAD`; write `q1_rad`"),
-            ("q1_rad,x_m,y_m,z_m,colour\n", "unknown column `colour`: rename it, or take it out; known are pose_id"),
+            ("q1_rad,x_m,,y_m,z_m\n", "line 1: a column without a name"),
+            ("q1_rad,x_m,y_m,z_m,colour\n", "unknown column `colour`: rename it, or leave it out with --ignore-columns; known are pose_id"),
             ("q1_rad,x_m,y_m,z_m,qx\n", "an orientation needs all of qx, qy, qz, qw"),
-            ("q1_rad,x_m,y_m,z_m\n0,0,0,0\n0,0,NaN,0\n", "line 3: `y_m` is `NaN`; a finite number is needed"),
+            ("q1_rad,x_m,y_m,z_m\n0,0,0,0\n0,0,1e400,0\n", "line 3: `y_m` is `1e400`; a finite number is needed"),
             ("q1_rad,x_m,y_m,z_m\n0,0,0\n", "line 2: 3 values, but the header names 4 columns"),
             ("q1_rad,x_m,y_m,z_m,qx,qy,qz,qw\n0,0,0,0,0,0,0,2\n", "line 2: the quaternion (qx, qy, qz, qw) has length 2"),
             ("q1_rad,x_m,y_m,z_m,approach1\n0,0,0,0,2\n", "line 2: `approach1` is `2`; -1, 0 or 1 is needed"),
