@@ -1,11 +1,11 @@
 //! What happens in a run, in order. Live views, the recording and its replay all see this one type, and
 //! nothing that computes knows of them: steps report what they do ([`Progress`]), the session tells it as events.
 
-use crate::identification::ladder::Freedom;
-use crate::measurement::Distance;
 use crate::design::outcome::{DesignOutcome, SearchStep, SwarmIteration};
 use crate::diagnosis::outcome::Diagnosis;
+use crate::identification::ladder::Freedom;
 use crate::identification::outcome::Identification;
+use crate::measurement::Distance;
 use crate::measurement::Measurement;
 use crate::progress::Progress;
 

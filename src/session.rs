@@ -14,8 +14,8 @@ use crate::event::{Event, Listener, RealCell, Start, measurements};
 use crate::identification::alignment::align;
 use crate::identification::geometry::GeometryError;
 use crate::identification::ladder::Freedom;
-use crate::identification::real::Wishes;
 use crate::identification::outcome::Identification;
+use crate::identification::real::Wishes;
 use crate::identification::{self, IdentificationError, identify};
 use crate::measurement::{Measurement, Role, Sensor};
 use crate::progress::Stopped;
@@ -204,7 +204,15 @@ pub fn real_arm(real: &RealCell, robot: (Arm, Vec<String>), measurements: &[Meas
     let fit: Vec<&Measurement> = measurements.iter().filter(|measurement| measurement.role == Role::Fit).collect();
     let (nominal, notes) = robot;
     let arm = align(&nominal, &sensor, &fit)?;
-    Ok(RealArm { robot: nominal, arm, sensor, noise_assumed: real.noise_assumed, only: real.only, zeros: real.zeros.clone(), notes })
+    Ok(RealArm {
+        robot: nominal,
+        arm,
+        sensor,
+        noise_assumed: real.noise_assumed,
+        only: real.only,
+        zeros: real.zeros.clone(),
+        notes,
+    })
 }
 
 /// Identifies a real arm and tells the listener.

@@ -6,6 +6,7 @@
 mod export;
 mod import;
 mod locate;
+mod others;
 mod rewrite;
 pub(crate) mod rpy;
 #[cfg(test)]
@@ -16,6 +17,7 @@ use std::path::PathBuf;
 
 pub use export::{export, export_with};
 pub use import::{Imported, import, read};
+pub use others::{ros_transforms, ur_kinematics};
 pub use rewrite::{Added, Change, rewrite};
 
 /// Why a URDF could not be read or written.

@@ -451,6 +451,10 @@ pub(crate) enum Format {
     Csv,
     /// The public part of the scene
     Toml,
+    /// The identified arm as the kinematics file of Universal Robots' driver (YAML)
+    UrKinematics,
+    /// Base and target of an identified arm as static transforms of ROS 2 (a shell script)
+    RosTransforms,
 }
 
 #[derive(Debug, Args)]

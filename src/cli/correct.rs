@@ -15,7 +15,8 @@ use crate::report;
 pub(crate) fn command(global: &Global, options: &CorrectOptions) -> anyhow::Result<Outcome> {
     let imported = urdf::read(&options.robot, options.base_link.as_deref(), options.tip_link.as_deref())?;
     let arm = imported.arm;
-    let euler = options.euler.as_ref().map(|text| text.parse().map_err(|wrong| anyhow::anyhow!("--euler {wrong}"))).transpose()?;
+    let euler =
+        options.euler.as_ref().map(|text| text.parse().map_err(|wrong| anyhow::anyhow!("--euler {wrong}"))).transpose()?;
     let reading = table::Reading {
         joints: arm.chain.joints.iter().map(|joint| (joint.name.clone(), joint.kind == JointKind::Prismatic)).collect(),
         euler,
@@ -56,7 +57,9 @@ pub(crate) fn command(global: &Global, options: &CorrectOptions) -> anyhow::Resu
     output::write(&path, &table::write_configurations(&configurations, &arm.slides()).context("writing the joints")?)?;
     let rows = missed
         .iter()
-        .map(|(pose, [position, turn])| vec![pose.to_string(), format!("{:.3}", position * 1e3), format!("{:.4}", turn.to_degrees())])
+        .map(|(pose, [position, turn])| {
+            vec![pose.to_string(), format!("{:.3}", position * 1e3), format!("{:.4}", turn.to_degrees())]
+        })
         .collect();
     let reached = configurations.len() - missed.len();
     output::show(global, &format!("{reached} of {} poses are reached within the joints' limits.", configurations.len()))?;

@@ -35,6 +35,9 @@ fn from_scene(options: &ExportOptions) -> anyhow::Result<(&'static str, String)>
     match options.to {
         Format::Urdf => Ok(("urdf", urdf::export(&file.scene.arm)?)),
         Format::Toml => Ok(("public.toml", file.public_toml()?)),
+        Format::UrKinematics | Format::RosTransforms => {
+            bail!("{} is a scene: give the recording of `kincal identify`", path.display())
+        }
         Format::Csv => bail!("{} is a scene and holds no measurements; give a recording", path.display()),
     }
 }
@@ -81,6 +84,22 @@ fn from_recording(global: &Global, options: &ExportOptions) -> anyhow::Result<(&
                 output::note(global, &noise_options(&scene()?.scene.sensor, &measured));
             }
             Ok(("csv", table::write(&measured, &arm()?.slides())?))
+        }
+        Format::UrKinematics | Format::RosTransforms => {
+            let identified = recording.events.iter().rev().find_map(|event| match event {
+                Event::Identified(identification) => Some(identification),
+                _ => None,
+            });
+            let Some(identification) = identified.filter(|_| start.real.is_some()) else {
+                bail!("{} holds no identification of a real arm: give the recording of `kincal identify`", path.display());
+            };
+            let arm = arm()?;
+            let values: Vec<f64> = identification.parameters.iter().map(|parameter| parameter.identified).collect();
+            if options.to == Format::RosTransforms {
+                return Ok(("transforms.sh", urdf::ros_transforms(&arm, &values)));
+            }
+            let text = urdf::ur_kinematics(&arm, &values).map_err(|wrong| anyhow::anyhow!("{}: {wrong}", path.display()))?;
+            Ok(("kinematics.yaml", text))
         }
         Format::Urdf => {
             let identified = recording.events.iter().rev().find_map(|event| match event {

@@ -142,9 +142,13 @@ pub(crate) fn corrected(table: &mut table::Table, arm: &Arm, options: &RobotOpti
 
 /// Reads the table of `input`, with gravity as it was said on the command line.
 pub(crate) fn read_table(path: &Path, arm: &Arm, options: &RobotOptions) -> anyhow::Result<table::Table> {
-    let euler = options.euler.as_ref().map(|text| text.parse().map_err(|wrong| anyhow::anyhow!("--euler {wrong}"))).transpose()?;
+    let euler =
+        options.euler.as_ref().map(|text| text.parse().map_err(|wrong| anyhow::anyhow!("--euler {wrong}"))).transpose()?;
     if let Some(ticks) = options.ticks_per_turn {
-        ensure!(ticks.is_finite() && ticks.abs() >= 1.0, "--ticks-per-turn {ticks}: a number of at least 1 is needed, such as 4096");
+        ensure!(
+            ticks.is_finite() && ticks.abs() >= 1.0,
+            "--ticks-per-turn {ticks}: a number of at least 1 is needed, such as 4096"
+        );
     }
     let reading = table::Reading {
         joints: arm.chain.joints.iter().map(|joint| (joint.name.clone(), joint.kind == JointKind::Prismatic)).collect(),

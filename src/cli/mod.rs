@@ -75,8 +75,10 @@ fn dispatch(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if let Some(threads) = global.threads {
         rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global()?;
     }
-    if let (Some(seed), Command::Correct(_) | Command::Diagnose(_) | Command::Identify(_) | Command::Replay(_) | Command::Export(_)) =
-        (global.seed, &arguments.command)
+    if let (
+        Some(seed),
+        Command::Correct(_) | Command::Diagnose(_) | Command::Identify(_) | Command::Replay(_) | Command::Export(_),
+    ) = (global.seed, &arguments.command)
     {
         ensure!(
             false,

@@ -468,7 +468,12 @@ pub(super) struct TestProducts(Products);
 #[cfg(test)]
 impl TestProducts {
     pub(super) fn marginal(&self) -> Marginal<'_> {
-        let prior = GeometryPrior { offset: DVector::zeros(0), free: Vec::new(), scale: 1.0, known: (DVector::zeros(0), DMatrix::zeros(0, 0)) };
+        let prior = GeometryPrior {
+            offset: DVector::zeros(0),
+            free: Vec::new(),
+            scale: 1.0,
+            known: (DVector::zeros(0), DMatrix::zeros(0, 0)),
+        };
         Marginal::new(&self.0, None, &prior).unwrap()
     }
 }

@@ -63,7 +63,9 @@ impl DiagnosisError {
     #[must_use]
     pub fn explanations(&self) -> &[Explanation] {
         match self {
-            DiagnosisError::NotThisRobot { explanations, .. } | DiagnosisError::NotThisGeometry { explanations, .. } => explanations,
+            DiagnosisError::NotThisRobot { explanations, .. } | DiagnosisError::NotThisGeometry { explanations, .. } => {
+                explanations
+            }
             _ => &[],
         }
     }
@@ -187,7 +189,12 @@ pub fn check_robot(
         let (hint, explanations) = mistake::hint(arm, said, measurements);
         let best = explanations.iter().filter_map(|found| corrected(&found.fixes)).fold(f64::INFINITY, f64::min);
         if best < FITS_BETTER * first.rms_m {
-            return Err(DiagnosisError::NotThisRobot { rms_mm: first.rms_m * 1e3, turn_deg: first.turn_rad.to_degrees(), hint, explanations });
+            return Err(DiagnosisError::NotThisRobot {
+                rms_mm: first.rms_m * 1e3,
+                turn_deg: first.turn_rad.to_degrees(),
+                hint,
+                explanations,
+            });
         }
     }
     Ok(())
@@ -246,12 +253,7 @@ pub(crate) fn first_fit(
     if rows.parameters.amax() > settings.implausible {
         let [shift, turn] = rows.largest_errors;
         let (hint, explanations) = mistake::hint(arm, said, measurements);
-        return Err(DiagnosisError::NotThisGeometry {
-            shift_mm: shift * 1e3,
-            turn_deg: turn.to_degrees(),
-            hint,
-            explanations,
-        });
+        return Err(DiagnosisError::NotThisGeometry { shift_mm: shift * 1e3, turn_deg: turn.to_degrees(), hint, explanations });
     }
     Ok(First { far: rows.far, calibrated: geometry::shrunk_residual(arm, readings, &loose)?, rms_m: rms, turn_rad })
 }
@@ -263,7 +265,8 @@ pub(crate) fn first_fit(
 pub(crate) fn fit(arm: &Arm, readings: Readings<'_>) -> Result<Rows, DiagnosisError> {
     let Readings { sensor, measurements, weights, displacement, scatter } = readings;
     let scatter: Vec<(usize, f64)> = scatter.iter().map(|one| (one.joint, one.sigma)).collect();
-    let fitted = geometry::fit(arm, geometry::Readings { sensor, measurements, weights, displacement, scatter: &scatter, zeros: &[] })?;
+    let fitted =
+        geometry::fit(arm, geometry::Readings { sensor, measurements, weights, displacement, scatter: &scatter, zeros: &[] })?;
     Ok(of_geometry(arm, measurements, fitted))
 }
 
@@ -334,7 +337,8 @@ mod tests {
     fn another_unit_is_no_arm_of_this_kind_and_a_few_wild_readings_are() {
         let settings = &Settings::default().model;
         let (arm, mut rows) = readings("test/robot", |_, _, _, _, _| 0.0);
-        let check = |rows: &[Measurement]| check_robot(&arm, &sensor(), &rows.iter().collect::<Vec<_>>(), settings, &Said::default());
+        let check =
+            |rows: &[Measurement]| check_robot(&arm, &sensor(), &rows.iter().collect::<Vec<_>>(), settings, &Said::default());
         rows[7].position_m[0] += 3.0;
         rows[30].position_m[2] -= 5.0;
         assert!(check(&rows).is_ok());

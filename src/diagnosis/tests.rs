@@ -32,7 +32,7 @@ pub(crate) fn sensor() -> Sensor {
         position_sigma_per_m: 0.0,
         orientation_sigma_rad: None,
         temperature_sigma_k: None,
-            distances: Vec::new(),
+        distances: Vec::new(),
         view: None,
     }
 }

@@ -147,9 +147,8 @@ fn near(pose: &Pose, wanted: &[f64; 6]) -> [f64; 6] {
     let [x, y, z, yaw, pitch, roll] = six(pose);
     let half = std::f64::consts::PI;
     let whole = |angle: f64, wanted: f64| angle - 2.0 * half * ((angle - wanted) / (2.0 * half)).round();
-    let form = |yaw: f64, pitch: f64, roll: f64| {
-        [x, y, z, whole(yaw, wanted[3]), whole(pitch, wanted[4]), whole(roll, wanted[5])]
-    };
+    let form =
+        |yaw: f64, pitch: f64, roll: f64| [x, y, z, whole(yaw, wanted[3]), whole(pitch, wanted[4]), whole(roll, wanted[5])];
     let mut forms = vec![form(yaw, pitch, roll), form(yaw + half, half - pitch, roll + half)];
     if (half / 2.0 - pitch.abs()).abs() < 1e-9 {
         // Only the sum or the difference of yaw and roll counts: yaw stays.

@@ -215,7 +215,8 @@ impl Geometry {
             }
             // Where a point is not known, predictions are in the measurement frame.
             let own = measurements.iter().filter(|row| row.fixed_point.as_ref() == Some(label));
-            let (sum, count) = own.fold((Vector3::zeros(), 0.0), |(sum, count), row| (sum + self.predict(row).translation.vector, count + 1.0));
+            let (sum, count) =
+                own.fold((Vector3::zeros(), 0.0), |(sum, count), row| (sum + self.predict(row).translation.vector, count + 1.0));
             self.points.push(label.clone());
             self.placed.points.push(sum / count);
         }
@@ -662,7 +663,9 @@ impl<'a> Placing<'a> {
             .sensor
             .distances
             .iter()
-            .filter_map(|of| Some((self.points.binary_search(&of.point_a).ok()?, self.points.binary_search(&of.point_b).ok()?, of)))
+            .filter_map(|of| {
+                Some((self.points.binary_search(&of.point_a).ok()?, self.points.binary_search(&of.point_b).ok()?, of))
+            })
             .collect();
         // Readings of fixed points alone leave the size of the arm open, and least squares would shrink it to a point.
         let sized = !known.is_empty() || self.point.iter().any(Option::is_none);
@@ -913,7 +916,8 @@ mod tests {
         let mut six = |size: f64| -> Vec<f64> { (0..6).map(|_| stream.uniform(-size, size)).collect() };
         let bases: Vec<Pose> = (0..sessions).map(|_| FrameErrors::pose(&six(2.0))).collect();
         let target = FrameErrors::pose(&six(0.1));
-        let errors: Vec<f64> = (0..6 * frames.frames()).map(|at| wrong * Sizes::MANUFACTURING.sigma(&frames, at) * stream.normal()).collect();
+        let errors: Vec<f64> =
+            (0..6 * frames.frames()).map(|at| wrong * Sizes::MANUFACTURING.sigma(&frames, at) * stream.normal()).collect();
         (0..count)
             .map(|index| {
                 let joints: Vec<f64> = arm.chain.joints.iter().map(|of| stream.uniform(of.lower, of.upper)).collect();
@@ -965,7 +969,8 @@ mod tests {
         let mut rows = readings(&arm, 60, 1, 0.1, 0.0, &mut stream);
         let (unmoved, weights, sensor) = (rows.clone(), vec![1.0; rows.len()], sensor(true));
         let read: Vec<&Measurement> = unmoved.iter().collect();
-        let whole = Readings { sensor: &sensor, measurements: &read, weights: &weights, displacement: &[], scatter: &[], zeros: &[] };
+        let whole =
+            Readings { sensor: &sensor, measurements: &read, weights: &weights, displacement: &[], scatter: &[], zeros: &[] };
         let before = fit(&arm, whole).unwrap();
         let turn = before.measurement_from_root()[0].rotation;
         let displacement: Vec<[f64; 6]> = (0..60).map(|_| std::array::from_fn(|_| stream.uniform(-1e-3, 1e-3))).collect();
@@ -996,7 +1001,14 @@ mod tests {
                 row.orientation_xyzw = row.orientation().map(|orientation| (turn * orientation).coords.into());
             }
             let fitted: Vec<&Measurement> = rows.iter().collect();
-            let of = Readings { sensor: &camera, measurements: &fitted, weights: &[1.0; 15], displacement: &[], scatter: &[], zeros: &[] };
+            let of = Readings {
+                sensor: &camera,
+                measurements: &fitted,
+                weights: &[1.0; 15],
+                displacement: &[],
+                scatter: &[],
+                zeros: &[],
+            };
             let square = |found: &Geometry| -> f64 {
                 others.iter().map(|row| difference(row, &found.predict(row)).fixed_rows::<3>(0).norm_squared()).sum()
             };
@@ -1009,7 +1021,14 @@ mod tests {
         let arm = arm(6, &mut stream);
         let rows = readings(&arm, 80, 1, 0.3, 2e-5, &mut stream);
         let fitted: Vec<&Measurement> = rows.iter().collect();
-        let of = Readings { sensor: &sensor(true), measurements: &fitted, weights: &[1.0; 80], displacement: &[], scatter: &[], zeros: &[] };
+        let of = Readings {
+            sensor: &sensor(true),
+            measurements: &fitted,
+            weights: &[1.0; 80],
+            displacement: &[],
+            scatter: &[],
+            zeros: &[],
+        };
         let sizes = fit(&arm, of).unwrap().likeliest_sizes();
         assert_eq!((sizes.lengths, sizes.turns), (0.3, 0.3), "{sizes:?}");
     }

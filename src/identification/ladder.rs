@@ -1,6 +1,8 @@
 //! How much of an arm readings can tell: base and target alone, then joint zeros, then lengths, then the whole geometry, each judged by
 //! readings that it was not fitted to.
 //!
+//! A rung is taken where it predicts better than the best below it by more than the standard error of that.
+//!
 //! Every rung has priors of the size that the readings choose ([`super::prior`]). What decides is the error on readings that are left out,
 //! fold by fold of different configurations: a rung that only fits noise is worse there than the one below.
 
@@ -107,7 +109,7 @@ pub fn climb(arm: &Arm, readings: Readings<'_>, only: Option<Freedom>) -> Result
         let left_out = left_out(&geometry, readings, &good);
         tried.push((free, geometry, left_out));
     }
-    let best = (0..tried.len()).min_by(|a, b| tried[*a].2.square.total_cmp(&tried[*b].2.square)).unwrap_or(0);
+    let best = highest(&tried.iter().map(|(_, _, left)| left.squares.as_slice()).collect::<Vec<_>>());
     let rung = |(at, (free, _, left)): (usize, &(Freedom, Geometry, LeftOut))| Rung {
         free: *free,
         left_out_m: left.position_m,
@@ -118,10 +120,25 @@ pub fn climb(arm: &Arm, readings: Readings<'_>, only: Option<Freedom>) -> Result
     Ok(Climbed { geometry: tried.swap_remove(best).1, rungs })
 }
 
+/// The rung up to which each is better than the best below it, by more than the standard error of the difference, row by row.
+fn highest(rungs: &[&[f64]]) -> usize {
+    let mut best = 0;
+    for (at, squares) in rungs.iter().enumerate().skip(1) {
+        let gains: Vec<f64> = rungs[best].iter().zip(*squares).map(|(before, after)| before - after).collect();
+        let count = gains.len().max(1) as f64;
+        let mean = gains.iter().sum::<f64>() / count;
+        let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+        if mean > libm::sqrt(variance / count) {
+            best = at;
+        }
+    }
+    best
+}
+
 /// Errors on readings that were left out.
 struct LeftOut {
-    /// Mean square in declared sigmas.
-    square: f64,
+    /// Mean square in declared sigmas of each row that counts.
+    squares: Vec<f64>,
     position_m: f64,
     rotation_rad: Option<f64>,
 }
@@ -136,7 +153,7 @@ fn left_out(geometry: &Geometry, readings: Readings<'_>, good: &[bool]) -> LeftO
     (0..normal.nrows()).for_each(|at| normal[(at, at)] += 1.0);
     let fold_of = folds(readings);
     let equations = &geometry.equations;
-    let (mut square, mut count) = (0.0, 0_usize);
+    let mut squares = Vec::new();
     let (mut of_position, mut of_rotation, mut rows) = (0.0, 0.0, 0_usize);
     for fold in 0..FOLDS {
         let own: Vec<usize> = (0..good.len()).filter(|row| fold_of[*row] == fold).collect();
@@ -147,18 +164,19 @@ fn left_out(geometry: &Geometry, readings: Readings<'_>, good: &[bool]) -> LeftO
         let change = without.cholesky().map_or_else(|| DVector::zeros(right.len()), |factor| factor.solve(&right));
         for row in own.into_iter().filter(|row| good[*row]) {
             rows += 1;
+            let mut square = 0.0;
             for equation in equations.of(row) {
                 let left = geometry.residual[equation] + geometry.jacobian.row(equation).dot(&change.transpose());
                 square += (left / equations.sigmas()[equation].max(1e-9)).powi(2);
-                count += 1;
                 let sum = if equations.component(equation) < 3 { &mut of_position } else { &mut of_rotation };
                 *sum += left * left;
             }
+            squares.push(square / equations.of(row).len().max(1) as f64);
         }
     }
     let rows = rows.max(1) as f64;
     LeftOut {
-        square: square / count.max(1) as f64,
+        squares,
         position_m: libm::sqrt(of_position / rows),
         rotation_rad: equations.has_orientation().then(|| libm::sqrt(of_rotation / rows)),
     }

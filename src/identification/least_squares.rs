@@ -343,6 +343,7 @@ pub(super) fn conclude(
         declared_noise: DeclaredNoise { position_m: noise.position_m, rotation_rad: noise.rotation_rad },
         noise_estimated: false,
         joint_frames: Vec::new(),
+        left_out: Vec::new(),
         ladder: Vec::new(),
         residuals,
         notes,

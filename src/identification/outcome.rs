@@ -47,6 +47,9 @@ pub struct Identification {
     /// How much of the arm was let loose, and how good that is on readings that were left out; empty for the arm of a scene.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ladder: Vec<Rung>,
+    /// Readings that are far off from what the others say, and were not used.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<LeftOut>,
     /// Residuals of every configuration, in the order of measuring.
     pub residuals: Vec<Residual>,
     /// What was assumed or left out.
@@ -67,6 +70,15 @@ pub struct JointFrame {
     pub shift_m: Vec<Deviation>,
     /// Turns of the axis about x and y of the joint's frame, rad; about the axis, too, where the joint slides.
     pub turn_rad: Vec<Deviation>,
+}
+
+/// A reading that was not used.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LeftOut {
+    /// Index of the measurement.
+    pub index: usize,
+    /// How far its position is off, m.
+    pub off_m: f64,
 }
 
 /// An estimate with its standard error.

@@ -5,9 +5,9 @@ use nalgebra::{Cholesky, DMatrix};
 
 use super::geometry::{FREE, Geometry, Readings};
 use super::ladder::{Climbed, Freedom, climb};
-use super::prior::{FRAME_SHIFT, FRAME_TURN, Sizes};
 use super::least_squares::{FOREIGN_ROBOT, IdentificationError, MAX_STEPS, Plain, Solved, check_joints, conclude};
-use super::outcome::{Identification, JointFrame};
+use super::outcome::{Identification, JointFrame, LeftOut};
+use super::prior::{FRAME_SHIFT, FRAME_TURN, Sizes};
 use super::{alignment, frames};
 use crate::arm::{Arm, Quantity};
 use crate::measurement::equations::Equations;
@@ -80,15 +80,32 @@ pub fn identify_real(
     );
     let fit: Vec<&Measurement> = good.iter().filter(|row| row.role == Role::Fit).collect();
     let climbed = climb_with(robot, sensor, &fit, wishes)?;
-    tell(robot, sensor, &good, wishes, climbed, vec![note])
+    let left_out = far.iter().map(|(row, off)| LeftOut { index: measurements[*row].index, off_m: *off }).collect();
+    let mut notes = vec![note];
+    notes.extend(exchanged(measurements, &far, &climbed.geometry, sensor));
+    Ok(Identification { left_out, ..tell(robot, sensor, &good, wishes, climbed, notes)? })
 }
 
-fn climb_with(
-    robot: &Arm,
-    sensor: &Sensor,
-    fit: &[&Measurement],
-    wishes: Wishes<'_>,
-) -> Result<Climbed, IdentificationError> {
+/// A pose is that of another row where it is nearer to that one's than this share of how far it is off.
+const THAT_OF_ANOTHER: f64 = 0.02;
+
+/// Readings that are far off and carry the pose of another row: rows that were exchanged, or a pose that was written twice.
+fn exchanged(measurements: &[Measurement], far: &[(usize, f64)], geometry: &Geometry, sensor: &Sensor) -> Vec<String> {
+    let predicted: Vec<_> = measurements.iter().map(|row| geometry.predict(row).translation.vector).collect();
+    let of_another = |(row, off): &(usize, f64)| {
+        let read = measurements[*row].position().coords;
+        let near = sensor.position_sigma_at(&read) * 10.0 + THAT_OF_ANOTHER * off;
+        let other = (0..measurements.len()).filter(|other| other != row);
+        let away = |other: usize| (predicted[other] - read).norm();
+        let nearest = other.min_by(|a, b| away(*a).total_cmp(&away(*b)))?;
+        (away(nearest) < near).then(|| format!("reading {} carries the pose of number {}", row + 1, nearest + 1))
+    };
+    let said: Vec<String> =
+        far.iter().filter(|(row, _)| measurements[*row].fixed_point.is_none()).filter_map(of_another).take(FAR_SAID).collect();
+    if said.is_empty() { Vec::new() } else { vec![format!("{}: were rows exchanged, or a pose written twice?", said.join(", "))] }
+}
+
+fn climb_with(robot: &Arm, sensor: &Sensor, fit: &[&Measurement], wishes: Wishes<'_>) -> Result<Climbed, IdentificationError> {
     let weights = vec![1.0; fit.len()];
     let readings =
         Readings { sensor, measurements: fit, weights: &weights, displacement: &[], scatter: &[], zeros: wishes.zeros };
@@ -240,7 +257,11 @@ fn tell(
         let known = sensor.distances.len();
         notes.push(format!(
             "{points} fixed points: errors are the distances of the readings of a point from where the arm has it{}{}",
-            if geometry.is_placed() { "" } else { "; where the arm stands is not known from these readings, nor is its first joint's zero" },
+            if geometry.is_placed() {
+                ""
+            } else {
+                "; where the arm stands is not known from these readings, nor is its first joint's zero"
+            },
             match known {
                 0 => "; without a known distance (--distances) the size of the arm is what its file says".to_owned(),
                 1 => "; 1 known distance".to_owned(),
@@ -291,13 +312,17 @@ const ABSURD: f64 = 0.06;
 /// Frames that are off by more than any arm's.
 fn absurd(joints: &[JointFrame]) -> Vec<String> {
     let largest = |joint: &JointFrame| {
-        let all = joint.shift_m.iter().map(|of| (of.estimate, " mm")).chain(joint.turn_rad.iter().map(|of| (of.estimate, " mrad")));
+        let all =
+            joint.shift_m.iter().map(|of| (of.estimate, " mm")).chain(joint.turn_rad.iter().map(|of| (of.estimate, " mrad")));
         all.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs())).filter(|(size, _)| size.abs() > ABSURD)
     };
     let said = |joint: &JointFrame| {
         let (size, unit) = largest(joint)?;
         let name = &joint.joint;
-        Some(format!("the frame of joint `{name}` is {:.0}{unit} from nominal: is it this robot, and are the units right?", size.abs() * 1e3))
+        Some(format!(
+            "the frame of joint `{name}` is {:.0}{unit} from nominal: is it this robot, and are the units right?",
+            size.abs() * 1e3
+        ))
     };
     joints.iter().filter_map(said).collect()
 }

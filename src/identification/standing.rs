@@ -65,13 +65,7 @@ pub fn stand(tools: &[Pose], measurements: &[&Measurement], target: &[usize], ta
     of_whole.or_else(|| stand_of(&every, tools, measurements, target, targets))
 }
 
-fn stand_of(
-    rows: &[usize],
-    tools: &[Pose],
-    measurements: &[&Measurement],
-    target: &[usize],
-    targets: usize,
-) -> Option<Standing> {
+fn stand_of(rows: &[usize], tools: &[Pose], measurements: &[&Measurement], target: &[usize], targets: usize) -> Option<Standing> {
     let sights: Vec<Sight> = rows
         .iter()
         .map(|row| Sight {
@@ -135,8 +129,7 @@ fn of_positions(sights: &[Sight], targets: usize) -> Option<Standing> {
     let directions = [Vector3::x(), Vector3::y(), Vector3::z()];
     let away = DISTANCES.iter().flat_map(|distance| directions.map(|axis| axis * (*distance * spread)));
     let starts = std::iter::once(Vector3::zeros()).chain(away.flat_map(|offset| [offset, -offset]));
-    let mut trials: Vec<Standing> =
-        starts.filter_map(|start| in_turn(sights, vec![start; targets], ROUNDS[0])).collect();
+    let mut trials: Vec<Standing> = starts.filter_map(|start| in_turn(sights, vec![start; targets], ROUNDS[0])).collect();
     trials.sort_by(|a, b| a.left_m.total_cmp(&b.left_m));
     let followed = trials.into_iter().take(FOLLOWED).filter_map(|trial| {
         let offsets = trial.tool_from_target.iter().map(|target| target.translation.vector).collect();

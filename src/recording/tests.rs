@@ -193,6 +193,7 @@ fn events(size: &Size) -> Vec<Event> {
     let parameters = arm().chain.parameters;
     events.push(Event::Identified(Identification {
         joint_frames: Vec::new(),
+        left_out: Vec::new(),
         ladder: Vec::new(),
         converged: true,
         reason: "the step is small".to_owned(),

@@ -226,6 +226,7 @@ fn events(particles: usize, count: usize, iterations: usize, held_out: usize) ->
     let (fit, verify) = residuals.split_at(count);
     events.push(Event::Identified(Identification {
         joint_frames: Vec::new(),
+        left_out: Vec::new(),
         ladder: Vec::new(),
         converged: true,
         reason: "the step fell below 1e-12".to_owned(),

@@ -68,7 +68,8 @@ fn targets_sessions_and_few_axes_are_identified() {
         let json = identified(&cases, folder, "m.csv", &noise);
         assert!(rms_mm(&json) < 0.1 && 1e3 * number(&json, "/nominal/position_m/rms") < 5.0, "{folder}: {}", rms_mm(&json));
     }
-    let json = identified(&cases, "two_axis_positioner", "m.csv", &["--position-noise-um", "100", "--attitude-noise-deg", "0.02"]);
+    let json =
+        identified(&cases, "two_axis_positioner", "m.csv", &["--position-noise-um", "100", "--attitude-noise-deg", "0.02"]);
     assert!(rms_mm(&json) < 0.2, "{}", rms_mm(&json));
 }
 

@@ -81,12 +81,8 @@ fn readings(arm: &Arm, orientation: bool, draws: &mut Stream) -> Vec<Measurement
     let chain = arm.chain.at(&values);
     (0..60)
         .map(|index| {
-            let joints: Vec<f64> = arm
-                .chain
-                .joints
-                .iter()
-                .map(|joint| draws.uniform(joint.lower.max(-2.6), joint.upper.min(2.6)))
-                .collect();
+            let joints: Vec<f64> =
+                arm.chain.joints.iter().map(|joint| draws.uniform(joint.lower.max(-2.6), joint.upper.min(2.6))).collect();
             let there = base * chain.forward(&joints) * target;
             let noise = Vector3::from_fn(|_, _| 5e-5 * draws.normal());
             Measurement {
@@ -167,7 +163,9 @@ fn mistake(kind: &str, rows: &mut Vec<Measurement>, arm: &Arm, draws: &mut Strea
             }),
             Fix::Zero(joint, zero) => rows.iter_mut().for_each(|row| row.joints[*joint] -= zero),
             Fix::Couple { joint, other, sign } => rows.iter_mut().for_each(|row| row.joints[*joint] += sign * row.joints[*other]),
-            Fix::Positions(_) => rows.iter_mut().for_each(|row| row.position_m = row.position_m.map(|value| value / 0.0254 * 1e-3)),
+            Fix::Positions(_) => {
+                rows.iter_mut().for_each(|row| row.position_m = row.position_m.map(|value| value / 0.0254 * 1e-3))
+            }
             Fix::PositionsOf(axis, _) => rows.iter_mut().for_each(|row| row.position_m[*axis] *= 0.1),
             Fix::Angles(_) => rows.iter_mut().for_each(|row| {
                 let turning = row.joints.iter_mut().zip(&slides).filter(|(_, slides)| !**slides);

@@ -152,7 +152,9 @@ fn tag(text: &str, name: &str) -> Option<Range<usize>> {
             continue;
         }
         let end = start + rest.find('>')? + 1;
-        let is_it = rest[1..].strip_prefix(name).is_some_and(|after| after.starts_with(|c: char| c.is_whitespace() || c == '/' || c == '>'));
+        let is_it = rest[1..]
+            .strip_prefix(name)
+            .is_some_and(|after| after.starts_with(|c: char| c.is_whitespace() || c == '/' || c == '>'));
         if is_it {
             return Some(start..end);
         }
@@ -223,7 +225,10 @@ mod tests {
         let expected = FILE
             .replace("xyz = '0.0  0 0.50'", "xyz = '0.0  0 0.501'")
             .replace("<origin xyz=\"0.30 0 0\"/>", "<origin rpy=\"0.01 0 0\" xyz=\"0.29 0 0\"/>")
-            .replace("<joint name=\"wrist\" type=\"revolute\">\n", "<joint name=\"wrist\" type=\"revolute\">\n    <origin xyz=\"0.2 0 0\" rpy=\"0 0 0\"/>\n");
+            .replace(
+                "<joint name=\"wrist\" type=\"revolute\">\n",
+                "<joint name=\"wrist\" type=\"revolute\">\n    <origin xyz=\"0.2 0 0\" rpy=\"0 0 0\"/>\n",
+            );
         assert_eq!(text, expected);
         let again = import(&text, "test", None, Some("hand")).unwrap().arm;
         let mut draws = stream(1, "test/rewrite");
@@ -233,7 +238,12 @@ mod tests {
             assert!(difference.amax() < 1e-15);
         }
         // Frames that are added stand at the end, and the file is still one.
-        let added = Added { parent: "hand".to_owned(), child: "ball".to_owned(), origin: [0.1, 0.0, 0.0, 0.0, 0.0, 0.0], new_link: "ball".to_owned() };
+        let added = Added {
+            parent: "hand".to_owned(),
+            child: "ball".to_owned(),
+            origin: [0.1, 0.0, 0.0, 0.0, 0.0, 0.0],
+            new_link: "ball".to_owned(),
+        };
         let (text, _) = rewrite(FILE, &arm, &values, &[added]).unwrap().unwrap();
         assert!(import(&text, "test", None, Some("ball")).is_ok());
     }

@@ -45,7 +45,7 @@ fn sensor(sigma: [f64; 2], orientation: bool) -> Sensor {
         position_sigma_per_m: 0.0,
         orientation_sigma_rad: orientation.then_some(sigma[1]),
         temperature_sigma_k: None,
-            distances: Vec::new(),
+        distances: Vec::new(),
         view: None,
     }
 }

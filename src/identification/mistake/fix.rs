@@ -230,7 +230,9 @@ impl Fix {
                 if *sign > 0.0 { "plus" } else { "minus" },
                 name(other)
             ),
-            Fix::Factor(joint, factor) => format!("joint {} turns {factor} times what is read (a gear ratio or a unit)", name(joint)),
+            Fix::Factor(joint, factor) => {
+                format!("joint {} turns {factor} times what is read (a gear ratio or a unit)", name(joint))
+            }
             Fix::Zero(joint, zero) => format!(
                 "joint {} reads {:.3}° too {}",
                 name(joint),
@@ -244,8 +246,12 @@ impl Fix {
             Fix::PositionsOf(axis, unit) => {
                 format!("{} of the positions is {}, whatever the column says", ["x", "y", "z"][*axis], spelt(unit))
             }
-            Fix::Axes(_) => "the measurement frame is left-handed or mirrored: an axis has the wrong sign, or two are swapped".to_owned(),
-            Fix::Inverse => "the poses are those of the measurement frame in the target's: the inverse of what is wanted".to_owned(),
+            Fix::Axes(_) => {
+                "the measurement frame is left-handed or mirrored: an axis has the wrong sign, or two are swapped".to_owned()
+            }
+            Fix::Inverse => {
+                "the poses are those of the measurement frame in the target's: the inverse of what is wanted".to_owned()
+            }
             Fix::RealPartFirst => "the quaternions stand in the order w, x, y, z".to_owned(),
             Fix::Conjugate => "the quaternions are conjugate: they turn the other way".to_owned(),
             Fix::Shift(first, by) => format!(
@@ -295,7 +301,8 @@ impl fmt::Display for Fix {
             Fix::Scale(factor) => write!(f, "positions:{factor}"),
             Fix::PositionsOf(axis, unit) => write!(f, "{}:{unit}", ["x", "y", "z"][*axis]),
             Fix::Axes(axes) => {
-                let one = |(axis, sign): &(usize, f64)| format!("{}{}", if *sign < 0.0 { "-" } else { "" }, ["x", "y", "z"][*axis]);
+                let one =
+                    |(axis, sign): &(usize, f64)| format!("{}{}", if *sign < 0.0 { "-" } else { "" }, ["x", "y", "z"][*axis]);
                 write!(f, "axes:{}", axes.iter().map(one).collect::<Vec<_>>().join(","))
             }
             Fix::Inverse => f.write_str("pose:inverse"),
@@ -350,7 +357,9 @@ impl FromStr for Fix {
                 Ok(factor) if factor.is_finite() && factor > 0.0 => Fix::Scale(factor),
                 _ => Fix::Positions(of_unit(&LENGTHS)?),
             },
-            "x" | "y" | "z" => Fix::PositionsOf(["x", "y", "z"].iter().position(|axis| *axis == what).unwrap_or(0), of_unit(&LENGTHS)?),
+            "x" | "y" | "z" => {
+                Fix::PositionsOf(["x", "y", "z"].iter().position(|axis| *axis == what).unwrap_or(0), of_unit(&LENGTHS)?)
+            }
             "axes" => {
                 let axis = |text: &str| {
                     let text = text.trim();
@@ -412,9 +421,23 @@ mod tests {
             let fix: Fix = text.parse().unwrap();
             assert_eq!(fix.to_string(), text);
         }
-        for wrong in ["", "order", "order:", "order:0", "reverse:x", "couple:3", "couple:3+3", "zero:3", "zero:3=nan", "angles:mm",
-            "axes:x,y", "axes:x,x,y", "shift:1=0", "drop:", "pose:other"]
-        {
+        for wrong in [
+            "",
+            "order",
+            "order:",
+            "order:0",
+            "reverse:x",
+            "couple:3",
+            "couple:3+3",
+            "zero:3",
+            "zero:3=nan",
+            "angles:mm",
+            "axes:x,y",
+            "axes:x,x,y",
+            "shift:1=0",
+            "drop:",
+            "pose:other",
+        ] {
             assert!(wrong.parse::<Fix>().unwrap_err().contains("is no correction; allowed are order:"), "{wrong}");
         }
     }
@@ -440,7 +463,10 @@ mod tests {
         let mut wrong = rows.clone();
         wrong.iter_mut().for_each(|row| row.joints[2] += row.joints[1]);
         assert_eq!(fixed("couple:3+2", wrong), rows);
-        assert_eq!(fixed("quaternion:wxyz", fixed("quaternion:wxyz", rows.clone()))[0].orientation_xyzw, Some([0.0, 0.8, 0.0, 0.6]));
+        assert_eq!(
+            fixed("quaternion:wxyz", fixed("quaternion:wxyz", rows.clone()))[0].orientation_xyzw,
+            Some([0.0, 0.8, 0.0, 0.6])
+        );
         assert_eq!(fixed("positions:inch", rows.clone())[2].position_m[0], 2.0 * 0.0254 / 1e-3);
         // From reading 3 on joints stand beside the pose of two rows later.
         let mut wrong = rows.clone();

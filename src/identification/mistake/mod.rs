@@ -142,7 +142,11 @@ pub fn explanations(arm: &Arm, said: &Said, rows: &[&Measurement]) -> Vec<Explan
     for size in 0..MOST {
         found.extend(beam.par_iter().flat_map_iter(|trial| search.of_joints(trial, true)).collect::<Vec<_>>());
         found.extend(singles.par_iter().flat_map_iter(|trial| search.of_joints(trial, false)).collect::<Vec<_>>());
-        singles = if size == 0 { found.iter().filter(|trial| trial.fixes.iter().all(Fix::is_plain)).cloned().collect() } else { Vec::new() };
+        singles = if size == 0 {
+            found.iter().filter(|trial| trial.fixes.iter().all(Fix::is_plain)).cloned().collect()
+        } else {
+            Vec::new()
+        };
         let good: Vec<Trial> = found.iter().filter(|trial| enough(&trial.left)).cloned().collect();
         if !good.is_empty() {
             return said_of(good, &search);
@@ -353,13 +357,17 @@ impl Search<'_> {
             let middle = |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / points.len() as f64;
             let (our_middle, their_middle) = (middle(&ours), middle(&positions));
             let both = ours.iter().zip(&positions).map(|(ours, theirs)| (ours - our_middle, theirs - their_middle));
-            let (with, own) = both.fold((0.0, 0.0), |(with, own), (ours, theirs)| (with + ours.dot(&theirs), own + theirs.norm_squared()));
+            let (with, own) =
+                both.fold((0.0, 0.0), |(with, own), (ours, theirs)| (with + ours.dot(&theirs), own + theirs.norm_squared()));
             // Of our own points on theirs: what is not explained makes it no smaller.
             factor *= with / own;
             if !(factor.is_finite() && factor > 0.0) {
                 return None;
             }
         }
+        // A prefix of a unit is meant as such.
+        let tens = 10f64.powf(factor.log10().round());
+        let factor = if (factor / tens - 1.0).abs() < 0.02 { tens } else { factor };
         let digits = 10f64.powf(3.0 - factor.log10().floor());
         Some((factor * digits).round() / digits).filter(|factor| (factor - 1.0).abs() > 0.05)
     }
@@ -385,9 +393,8 @@ impl Search<'_> {
     /// `trial` with one more mistake about joints; all of them, or those that are a choice among few.
     fn of_joints(&self, trial: &Trial, all: bool) -> Vec<Trial> {
         let count = self.slides.len();
-        let touched = |joint: usize| {
-            trial.fixes.iter().any(|fix| matches!(fix, Fix::Zero(of, _) | Fix::Factor(of, _) if *of == joint))
-        };
+        let touched =
+            |joint: usize| trial.fixes.iter().any(|fix| matches!(fix, Fix::Zero(of, _) | Fix::Factor(of, _) if *of == joint));
         let mut tried = Vec::new();
         let mut add = |fix: Fix| tried.extend(self.trial(trial, fix));
         for joint in 0..count {

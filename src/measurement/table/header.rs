@@ -9,26 +9,51 @@ use super::Reading;
 pub(super) enum Column {
     PoseId,
     /// Seconds per unit; a text may be a date and a time.
-    Time { factor: f64 },
-    Joint { joint: usize, factor: f64, is_length: bool },
+    Time {
+        factor: f64,
+    },
+    Joint {
+        joint: usize,
+        factor: f64,
+        is_length: bool,
+    },
     /// Ticks of an encoder, whose number per turn somebody says.
-    Ticks { joint: usize },
-    Position { axis: usize, factor: f64 },
-    Quaternion { component: usize },
+    Ticks {
+        joint: usize,
+    },
+    Position {
+        axis: usize,
+        factor: f64,
+    },
+    Quaternion {
+        component: usize,
+    },
     /// An angle of a turn about an axis, or a part of a rotation vector.
-    Euler { axis: usize, factor: f64 },
+    Euler {
+        axis: usize,
+        factor: f64,
+    },
     /// An entry of a rotation matrix.
-    Matrix { row: usize, column: usize },
+    Matrix {
+        row: usize,
+        column: usize,
+    },
     Role,
-    Temperature { sensor: usize },
-    Approach { joint: usize },
+    Temperature {
+        sensor: usize,
+    },
+    Approach {
+        joint: usize,
+    },
     Ambient,
     Payload,
     Dwell,
     Session,
     Target,
     FixedPoint,
-    Gravity { axis: usize },
+    Gravity {
+        axis: usize,
+    },
     /// Somebody said that it is not to be read.
     Ignored,
 }
@@ -45,8 +70,7 @@ const LENGTHS: [(&[&str], f64); 5] = [
     (&["um", "µm", "micron", "microns"], 1e-6),
     (&["in", "inch", "inches"], 0.0254),
 ];
-const ANGLES: [(&[&str], f64); 2] =
-    [(&["rad", "radian", "radians"], 1.0), (&["deg", "degree", "degrees", "°"], PI / 180.0)];
+const ANGLES: [(&[&str], f64); 2] = [(&["rad", "radian", "radians"], 1.0), (&["deg", "degree", "degrees", "°"], PI / 180.0)];
 
 fn factor(units: &[(&[&str], f64)], unit: &str) -> Option<f64> {
     units.iter().find(|(names, _)| names.contains(&unit)).map(|(_, factor)| *factor)
@@ -96,10 +120,14 @@ impl Name {
             return Name { base: base.trim_end_matches('_').to_owned(), unit: bracketed };
         }
         let is_unit = |unit: &str| {
-            factor(&LENGTHS, unit).is_some() || factor(&ANGLES, unit).is_some() || matches!(unit, "ticks" | "s" | "ms" | "us" | "ns")
+            factor(&LENGTHS, unit).is_some()
+                || factor(&ANGLES, unit).is_some()
+                || matches!(unit, "ticks" | "s" | "ms" | "us" | "ns")
         };
         match base.rsplit_once('_') {
-            Some((rest, unit)) if is_unit(unit) && !rest.is_empty() => Name { base: rest.to_owned(), unit: Some(unit.to_owned()) },
+            Some((rest, unit)) if is_unit(unit) && !rest.is_empty() => {
+                Name { base: rest.to_owned(), unit: Some(unit.to_owned()) }
+            }
             _ => Name { base, unit: None },
         }
     }
@@ -156,7 +184,8 @@ fn meant(text: &str, joints: &[String], from_zero: bool) -> Meant {
         };
     }
     let quaternions = ["q", "q_", "quat_", "quat", "quaternion_", "ori_", "orientation_"];
-    let component = ["x", "y", "z", "w"].iter().position(|name| quaternions.iter().any(|prefix| base == format!("{prefix}{name}")));
+    let component =
+        ["x", "y", "z", "w"].iter().position(|name| quaternions.iter().any(|prefix| base == format!("{prefix}{name}")));
     if let Some(component) = component {
         return Meant::Column(Column::Quaternion { component });
     }
@@ -171,13 +200,19 @@ fn meant(text: &str, joints: &[String], from_zero: bool) -> Meant {
             None => Meant::NoUnit(format!("{base}_deg or {base}_rad")),
         };
     }
-    let digits: Vec<usize> =
-        base.strip_prefix(['r', 'm']).unwrap_or_default().chars().filter_map(|c| c.to_digit(10).map(|digit| digit as usize)).collect();
+    let digits: Vec<usize> = base
+        .strip_prefix(['r', 'm'])
+        .unwrap_or_default()
+        .chars()
+        .filter_map(|c| c.to_digit(10).map(|digit| digit as usize))
+        .collect();
     if let ([row @ 1..=3, column @ 1..=3], 3) = (digits.as_slice(), base.len()) {
         return Meant::Column(Column::Matrix { row: row - 1, column: column - 1 });
     }
     match (base.as_str(), unit) {
-        ("time" | "t" | "timestamp" | "stamp" | "datetime" | "date_time", None | Some("s")) => Meant::Column(Column::Time { factor: 1.0 }),
+        ("time" | "t" | "timestamp" | "stamp" | "datetime" | "date_time", None | Some("s")) => {
+            Meant::Column(Column::Time { factor: 1.0 })
+        }
         ("time" | "t" | "timestamp" | "stamp", Some("ms")) => Meant::Column(Column::Time { factor: 1e-3 }),
         ("time" | "t" | "timestamp" | "stamp", Some("us")) => Meant::Column(Column::Time { factor: 1e-6 }),
         ("time" | "t" | "timestamp" | "stamp", Some("ns")) => Meant::Column(Column::Time { factor: 1e-9 }),
@@ -212,7 +247,12 @@ impl Header {
     ///
     /// # Errors
     /// What is wrong, and what is allowed.
-    pub(super) fn new(names: &csv::StringRecord, joints: &[String], slides: &[bool], reading: &Reading) -> Result<Header, String> {
+    pub(super) fn new(
+        names: &csv::StringRecord,
+        joints: &[String],
+        slides: &[bool],
+        reading: &Reading,
+    ) -> Result<Header, String> {
         let ignored = &reading.ignored;
         for (index, name) in names.iter().enumerate() {
             if !name.is_empty() && names.iter().take(index).any(|other| other == name) {
@@ -223,8 +263,14 @@ impl Header {
             return Err(format!("--ignore-columns {missing}: the table has no such column"));
         }
         // `q0 … q5` are six joints.
-        let zero = |name: &str| matches!(meant(name, &[], true), Meant::Joint(0) | Meant::Column(Column::Joint { joint: 0, .. } | Column::Ticks { joint: 0 }));
-        let from_zero = names.iter().any(|name| zero(name) && !joints.iter().any(|joint| joint.eq_ignore_ascii_case(name.trim())));
+        let zero = |name: &str| {
+            matches!(
+                meant(name, &[], true),
+                Meant::Joint(0) | Meant::Column(Column::Joint { joint: 0, .. } | Column::Ticks { joint: 0 })
+            )
+        };
+        let from_zero =
+            names.iter().any(|name| zero(name) && !joints.iter().any(|joint| joint.eq_ignore_ascii_case(name.trim())));
         let mut notes = Vec::new();
         let mut unitless: Vec<&str> = Vec::new();
         let mut columns = Vec::with_capacity(names.len());
@@ -302,9 +348,11 @@ impl Header {
             (Ok(0), _, Ok(0)) => return Err("an orientation needs three angles: rx_deg, ry_deg, rz_deg (or _rad)".to_owned()),
             (Ok(0), Ok(0), _) => return Err("an orientation needs all of r11 … r33".to_owned()),
             _ => {
-                return Err("one orientation is enough: qx, qy, qz, qw, or three angles, or r11 … r33; leave out the others with \
+                return Err(
+                    "one orientation is enough: qx, qy, qz, qw, or three angles, or r11 … r33; leave out the others with \
                             --ignore-columns"
-                    .to_owned());
+                        .to_owned(),
+                );
             }
         };
         let sensors = numbered(&columns, |column| match column {
@@ -366,7 +414,12 @@ mod tests {
     fn header(names: &[&str]) -> Result<Header, String> {
         let ignored = names.iter().filter(|name| **name == "note").map(|name| (*name).to_owned()).collect();
         let joints = ["shoulder_pan_joint".to_owned(), "elbow_joint".to_owned()];
-        Header::new(&csv::StringRecord::from(names.to_vec()), &joints, &[false, false], &Reading { ignored, ..Reading::default() })
+        Header::new(
+            &csv::StringRecord::from(names.to_vec()),
+            &joints,
+            &[false, false],
+            &Reading { ignored, ..Reading::default() },
+        )
     }
 
     #[test]
@@ -375,17 +428,35 @@ mod tests {
         let at = |axis, factor| Column::Position { axis, factor };
         let degree = PI / 180.0;
         for (names, expected) in [
-            (["J1 [deg]", "J2 [deg]", "X (mm)", "Y (mm)", "Z (mm)"], [joint(0, degree), joint(1, degree), at(0, 1e-3), at(1, 1e-3), at(2, 1e-3)]),
-            (["elbow_joint", "shoulder_pan_joint", "pos_x [m]", "pos_y [m]", "pos_z [m]"], [joint(1, 1.0), joint(0, 1.0), at(0, 1.0), at(1, 1.0), at(2, 1.0)]),
-            (["q0_rad", "q1_rad", "tx_inch", "ty_inch", "tz_inch"], [joint(0, 1.0), joint(1, 1.0), at(0, 0.0254), at(1, 0.0254), at(2, 0.0254)]),
-            (["joint_1_deg", "Joint 2 (rad)", "x_m", "y_cm", "z_um"], [joint(0, degree), joint(1, 1.0), at(0, 1.0), at(1, 1e-2), at(2, 1e-6)]),
-            (["A1 [°]", "A2 [°]", "x_m", "y_m", "note"], [joint(0, degree), joint(1, degree), at(0, 1.0), at(1, 1.0), Column::Ignored]),
+            (
+                ["J1 [deg]", "J2 [deg]", "X (mm)", "Y (mm)", "Z (mm)"],
+                [joint(0, degree), joint(1, degree), at(0, 1e-3), at(1, 1e-3), at(2, 1e-3)],
+            ),
+            (
+                ["elbow_joint", "shoulder_pan_joint", "pos_x [m]", "pos_y [m]", "pos_z [m]"],
+                [joint(1, 1.0), joint(0, 1.0), at(0, 1.0), at(1, 1.0), at(2, 1.0)],
+            ),
+            (
+                ["q0_rad", "q1_rad", "tx_inch", "ty_inch", "tz_inch"],
+                [joint(0, 1.0), joint(1, 1.0), at(0, 0.0254), at(1, 0.0254), at(2, 0.0254)],
+            ),
+            (
+                ["joint_1_deg", "Joint 2 (rad)", "x_m", "y_cm", "z_um"],
+                [joint(0, degree), joint(1, 1.0), at(0, 1.0), at(1, 1e-2), at(2, 1e-6)],
+            ),
+            (
+                ["A1 [°]", "A2 [°]", "x_m", "y_m", "note"],
+                [joint(0, degree), joint(1, degree), at(0, 1.0), at(1, 1.0), Column::Ignored],
+            ),
         ] {
             assert_eq!(header(&names).unwrap().columns, expected, "{names:?}");
         }
         let all = header(&["q1_rad", "q2_ticks", "x_m", "Timestamp", "roll [deg]", "pitch [deg]", "yaw [deg]"]).unwrap();
         assert_eq!((all.orientation, all.read), (Orientation::Euler, [true, false, false]));
-        assert_eq!(header(&["q1_rad", "x_m", "r11", "r12", "r13", "r21", "r22", "r23", "r31", "r32", "r33"]).unwrap().orientation, Orientation::Matrix);
+        assert_eq!(
+            header(&["q1_rad", "x_m", "r11", "r12", "r13", "r21", "r22", "r23", "r31", "r32", "r33"]).unwrap().orientation,
+            Orientation::Matrix
+        );
         for (names, expected) in [
             (["q1", "x_m"], "`q1` has no known unit; write q1_rad, _deg"),
             (["q1_rad", "x"], "`x` has no known unit; write x_m, x_mm"),

@@ -133,7 +133,9 @@ pub fn read_distances(path: impl AsRef<Path>) -> Result<Vec<Distance>, TableErro
     let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
     let header = reader.headers().map_err(|error| wrong(1, error.to_string()))?.clone();
     let column = |name: &str| header.iter().position(|known| known == name);
-    let length = |name: &str| [("_mm", 1e-3), ("_m", 1.0)].into_iter().find_map(|(end, unit)| Some((column(&format!("{name}{end}"))?, unit)));
+    let length = |name: &str| {
+        [("_mm", 1e-3), ("_m", 1.0)].into_iter().find_map(|(end, unit)| Some((column(&format!("{name}{end}"))?, unit)))
+    };
     let (Some(a), Some(b), Some(distance), Some(sigma), 4) =
         (column("point_a"), column("point_b"), length("distance"), length("sigma"), header.len())
     else {
@@ -203,7 +205,9 @@ impl std::str::FromStr for Euler {
         let axes: Vec<usize> = named.chars().filter_map(|c| "xyz".find(c.to_ascii_lowercase())).collect();
         let same_case = moving || named.chars().all(|c| c.is_ascii_lowercase());
         match axes.as_slice() {
-            [a, b, c] if named.len() == 3 && same_case && a != b && b != c && a != c => Ok(Euler::Turns { axes: [*a, *b, *c], moving }),
+            [a, b, c] if named.len() == 3 && same_case && a != b && b != c && a != c => {
+                Ok(Euler::Turns { axes: [*a, *b, *c], moving })
+            }
             _ => Err(format!(
                 "{text}: rpy (URDF, ROS: fixed x, y, z), abc (KUKA), wpr (FANUC), rotvec (Universal Robots), or the order of the turns, such as \
                  xyz about fixed axes or ZYX about moving ones, is needed"
@@ -303,7 +307,10 @@ pub fn parse_as(text: &str, file: &str, reading: &Reading) -> Result<Table, Tabl
     };
     let per_turn = reading.ticks_per_turn.unwrap_or(1.0);
     if reading.ticks_per_turn.is_none() && columns.iter().any(|column| matches!(column, Column::Ticks { .. })) {
-        return Err(wrong(header_line, "columns of encoder ticks: say with --ticks-per-turn how many there are per turn of the joint".to_owned()));
+        return Err(wrong(
+            header_line,
+            "columns of encoder ticks: say with --ticks-per-turn how many there are per turn of the joint".to_owned(),
+        ));
     }
     let mut notes = notes.clone();
     let mut empty: Vec<(u64, String)> = Vec::new();
@@ -338,7 +345,14 @@ pub fn parse_as(text: &str, file: &str, reading: &Reading) -> Result<Table, Tabl
         let (mut angles, mut matrix) = ([0.0; 3], Matrix3::zeros());
         let mut missing: Option<String> = None;
         for ((column, text), name) in columns.iter().zip(record.iter()).zip(header.iter()) {
-            let reads = matches!(column, Column::Joint { .. } | Column::Ticks { .. } | Column::Quaternion { .. } | Column::Euler { .. } | Column::Matrix { .. });
+            let reads = matches!(
+                column,
+                Column::Joint { .. }
+                    | Column::Ticks { .. }
+                    | Column::Quaternion { .. }
+                    | Column::Euler { .. }
+                    | Column::Matrix { .. }
+            );
             if reads && text::is_missing(text) {
                 missing.get_or_insert_with(|| name.to_owned());
                 continue;
@@ -363,7 +377,13 @@ pub fn parse_as(text: &str, file: &str, reading: &Reading) -> Result<Table, Tabl
                         Ok(value) if value.is_finite() => value * factor,
                         Ok(_) => number()?,
                         Err(_) => moment(text).ok_or_else(|| {
-                            wrong(line, format!("`{name}` is `{}`; seconds, or a date and time such as 2026-05-01T12:30:00.5 are needed", short(text)))
+                            wrong(
+                                line,
+                                format!(
+                                    "`{name}` is `{}`; seconds, or a date and time such as 2026-05-01T12:30:00.5 are needed",
+                                    short(text)
+                                ),
+                            )
                         })?,
                     }
                 }
@@ -446,7 +466,12 @@ pub fn parse_as(text: &str, file: &str, reading: &Reading) -> Result<Table, Tabl
             Orientation::Matrix => {
                 let off = (matrix * matrix.transpose() - Matrix3::identity()).amax();
                 if off > 1e-3 || matrix.determinant() < 0.0 {
-                    return Err(wrong(line, format!("r11 … r33 are no rotation: their product with their transpose is off one by {off:.3}, or they mirror")));
+                    return Err(wrong(
+                        line,
+                        format!(
+                            "r11 … r33 are no rotation: their product with their transpose is off one by {off:.3}, or they mirror"
+                        ),
+                    ));
                 }
                 let rotation = Rotation3::from_matrix_eps(&matrix, 1e-15, 100, Rotation3::identity());
                 row.orientation_xyzw = Some(UnitQuaternion::from_rotation_matrix(&rotation).coords.into());
@@ -471,7 +496,8 @@ pub fn parse_as(text: &str, file: &str, reading: &Reading) -> Result<Table, Tabl
     if let Some((line, name)) = empty.first() {
         let total = measurements.len() + empty.len();
         if empty.len() as f64 > MOST_EMPTY * total as f64 {
-            let message = format!("`{name}` has no number here, and {} of {total} rows lack some: is it the right column?", empty.len());
+            let message =
+                format!("`{name}` has no number here, and {} of {total} rows lack some: is it the right column?", empty.len());
             return Err(wrong(*line, message));
         }
         let said: Vec<String> = empty.iter().take(NAMED).map(|(line, name)| format!("{line} ({name})")).collect();
@@ -576,7 +602,8 @@ pub fn write(measurements: &[Measurement], slides: &[bool]) -> Result<String, cs
         let mut fields = vec![row.pose_id.to_string(), role.to_owned(), row.time_s.to_string()];
         let quaternion = row.orientation_xyzw.iter().filter(|_| orientation).flatten();
         fields.extend(row.joints.iter().map(f64::to_string));
-        fields.extend(axes.iter().map(|axis| if is_read(row, *axis) { row.position_m[*axis].to_string() } else { String::new() }));
+        fields
+            .extend(axes.iter().map(|axis| if is_read(row, *axis) { row.position_m[*axis].to_string() } else { String::new() }));
         fields.extend(quaternion.chain(&row.temperatures_c[..sensors]).map(f64::to_string));
         fields.extend(row.approach.iter().filter(|_| approach).map(i8::to_string));
         fields.extend(row.gravity_m_s2.iter().flatten().filter(|_| gravity).map(f64::to_string));
@@ -729,7 +756,10 @@ mod tests {
             ("q1_rad,time_s\n0,0\n", "needs x_m, y_m, z_m (or _mm), those that were read"),
             ("q1_rad,x_m,x_mm\n0,0,0\n", "needs x_m, y_m, z_m (or _mm), those that were read, each once"),
             ("q1_rad,x_m,y_m\n0,0,0\n0,,\n0,nan,NaN\n", "line 3: `x, y, z` has no number here, and 2 of 3 rows lack some"),
-            ("q1_rad,x_m,rx_deg,ry_deg,rz_deg\n0,0,0,0,0\n", "line 1: three angles make an orientation in many ways: say with --euler"),
+            (
+                "q1_rad,x_m,rx_deg,ry_deg,rz_deg\n0,0,0,0,0\n",
+                "line 1: three angles make an orientation in many ways: say with --euler",
+            ),
             ("q1_ticks,x_m\n0,0\n", "line 1: columns of encoder ticks: say with --ticks-per-turn"),
             ("q1_rad,x_m,fixed_point\n0,0,a\n", "line 2: a position and the fixed point `a`"),
             ("q1_rad,x_m,r11,r12,r13,r21,r22,r23,r31,r32,r33\n0,0,1,0,0,0,1,0,0,0,-1\n", "line 2: r11 … r33 are no rotation"),
@@ -737,7 +767,10 @@ mod tests {
             ("q1_rad,q3_rad,x_m,y_m,z_m\n", "q2 is missing or doubled"),
             ("0.3,1,2,3\n", "line 1: a number (`0.3`) where the names of the columns should be"),
             ("q1_rad,x_m,,y_m,z_m\n", "line 1: a column without a name"),
-            ("q1_rad,x_m,y_m,z_m,colour\n", "unknown column `colour`: rename it, or leave it out with --ignore-columns; known are pose_id"),
+            (
+                "q1_rad,x_m,y_m,z_m,colour\n",
+                "unknown column `colour`: rename it, or leave it out with --ignore-columns; known are pose_id",
+            ),
             ("q1_rad,x_m,y_m,z_m,qx\n", "an orientation needs all of qx, qy, qz, qw"),
             ("q1_rad,x_m,y_m,z_m\n0,0,0,0\n0,0,1e400,0\n", "line 3: `y_m` is `1e400`; a finite number is needed"),
             ("q1_rad,x_m,y_m,z_m\n0,0,0\n", "line 2: 3 values, but the header names 4 columns"),

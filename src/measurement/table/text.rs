@@ -57,7 +57,8 @@ pub(super) fn layout(text: &str) -> Layout {
     if separator != b',' {
         for cell in lines.take(50).flat_map(|line| line.split(char::from(separator))) {
             let cell = cell.trim();
-            let numeric = !cell.is_empty() && cell.chars().all(|c| c.is_ascii_digit() || matches!(c, ',' | '-' | '+' | 'e' | 'E'));
+            let numeric =
+                !cell.is_empty() && cell.chars().all(|c| c.is_ascii_digit() || matches!(c, ',' | '-' | '+' | 'e' | 'E'));
             commas |= numeric && cell.matches(',').count() == 1;
         }
     }
@@ -77,7 +78,10 @@ impl Layout {
 
 /// Whether a cell says that there is no number.
 pub(super) fn is_missing(cell: &str) -> bool {
-    matches!(cell.to_ascii_lowercase().as_str(), "" | "nan" | "-nan" | "na" | "n/a" | "null" | "none" | "inf" | "-inf" | "+inf" | "-" | "?")
+    matches!(
+        cell.to_ascii_lowercase().as_str(),
+        "" | "nan" | "-nan" | "na" | "n/a" | "null" | "none" | "inf" | "-inf" | "+inf" | "-" | "?"
+    )
 }
 
 #[cfg(test)]
@@ -93,9 +97,14 @@ mod tests {
             units.for_each(|unit| bytes.extend(if little { unit.to_le_bytes() } else { unit.to_be_bytes() }));
             bytes
         };
-        for bytes in [text.as_bytes().to_vec(), [&[0xEF, 0xBB, 0xBF], text.as_bytes()].concat(), wide(true, true), wide(false, true),
-            wide(true, false), wide(false, false)]
-        {
+        for bytes in [
+            text.as_bytes().to_vec(),
+            [&[0xEF, 0xBB, 0xBF], text.as_bytes()].concat(),
+            wide(true, true),
+            wide(false, true),
+            wide(true, false),
+            wide(false, false),
+        ] {
             assert_eq!(decoded(&bytes).unwrap(), text);
         }
         assert_eq!(decoded(b"a,b\n1,\xE9\n").unwrap_err().0, 2);
