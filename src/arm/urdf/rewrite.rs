@@ -165,7 +165,7 @@ fn tag(text: &str, name: &str) -> Option<Range<usize>> {
 
 /// Where the value of attribute `name` stands in `tag`, without its quotes.
 fn attribute(tag: &str, name: &str) -> Option<Range<usize>> {
-    let found = tag.match_indices(name).find_map(|(start, word)| {
+    tag.match_indices(name).find_map(|(start, word)| {
         tag[..start].chars().next_back().filter(|c| c.is_whitespace())?;
         let after = start + word.len();
         let equals = after + tag[after..].find(|c: char| !c.is_whitespace())?;
@@ -176,8 +176,7 @@ fn attribute(tag: &str, name: &str) -> Option<Range<usize>> {
         let quote = tag[quote_at..].chars().next().filter(|c| matches!(c, '"' | '\''))?;
         let length = tag[quote_at + 1..].find(quote)?;
         Some(quote_at + 1..quote_at + 1 + length)
-    });
-    found
+    })
 }
 
 #[cfg(test)]

@@ -470,8 +470,8 @@ mod tests {
         assert_eq!(fixed("positions:inch", rows.clone())[2].position_m[0], 2.0 * 0.0254 / 1e-3);
         // From reading 3 on joints stand beside the pose of two rows later.
         let mut wrong = rows.clone();
-        for row in 2..6 {
-            wrong[row].position_m = [(row + 2) as f64, 1.0, 2.0];
+        for (row, wrong) in wrong.iter_mut().enumerate().skip(2) {
+            wrong.position_m = [(row + 2) as f64, 1.0, 2.0];
         }
         let fixed_rows = fixed("shift:3=+2", wrong);
         assert_eq!(fixed_rows.len(), 4);

@@ -366,9 +366,9 @@ impl Search<'_> {
             }
         }
         // A prefix of a unit is meant as such.
-        let tens = 10f64.powf(factor.log10().round());
+        let tens = libm::pow(10.0, libm::log10(factor).round());
         let factor = if (factor / tens - 1.0).abs() < 0.02 { tens } else { factor };
-        let digits = 10f64.powf(3.0 - factor.log10().floor());
+        let digits = libm::pow(10.0, 3.0 - libm::log10(factor).floor());
         Some((factor * digits).round() / digits).filter(|factor| (factor - 1.0).abs() > 0.05)
     }
 
