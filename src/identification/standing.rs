@@ -205,8 +205,8 @@ fn of_orientations(sights: &[Sight], targets: usize) -> Option<Standing> {
         row.view_mut((0, 0), (3, 3)).copy_from(&Matrix3::identity());
         row.view_mut((0, 3 + 3 * sight.target), (3, 3)).copy_from(&(rotation * sight.axes));
         let left = sight.position - rotation * sight.tool.translation.vector;
-        normal += row.transpose() * &row;
-        right += row.transpose() * left;
+        normal += row.tr_mul(&row);
+        right += row.tr_mul(&left);
     }
     let solved = normal.cholesky()?.solve(&right);
     let offsets: Vec<Vector3<f64>> = (0..targets).map(|target| solved.fixed_rows::<3>(3 + 3 * target).into_owned()).collect();

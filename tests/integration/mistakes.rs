@@ -173,10 +173,9 @@ fn mistake(kind: &str, rows: &mut Vec<Measurement>, arm: &Arm, draws: &mut Strea
             }),
             Fix::Shift(first, by) => {
                 let read = rows.clone();
-                for row in *first..rows.len() {
-                    let from = row.checked_add_signed(*by).filter(|from| *from < read.len());
-                    if let Some(from) = from {
-                        (rows[row].position_m, rows[row].orientation_xyzw) = (read[from].position_m, read[from].orientation_xyzw);
+                for (row, wrong) in rows.iter_mut().enumerate().skip(*first) {
+                    if let Some(from) = row.checked_add_signed(*by).filter(|from| *from < read.len()) {
+                        (wrong.position_m, wrong.orientation_xyzw) = (read[from].position_m, read[from].orientation_xyzw);
                     }
                 }
                 rows.truncate(read.len().saturating_sub(by.unsigned_abs()));
