@@ -293,6 +293,18 @@ pub(crate) struct MeasureOptions {
     pub(crate) design: PathBuf,
 }
 
+/// How a table is laid out.
+#[derive(Debug, Args)]
+pub(crate) struct LayoutOptions {
+    /// How three angles of a table make an orientation: rpy (URDF, ROS), abc (KUKA), wpr (FANUC), rotvec (Universal Robots), or the order of
+    /// the turns, such as xyz about fixed axes or ZYX about moving ones
+    #[arg(long, value_name = "CONVENTION")]
+    pub(crate) euler: Option<String>,
+    /// Columns of a table that are not to be read
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub(crate) ignore_columns: Vec<String>,
+}
+
 /// The robot and the sensor of a table.
 #[derive(Debug, Args)]
 pub(crate) struct RobotOptions {
@@ -311,16 +323,11 @@ pub(crate) struct RobotOptions {
     /// Declared orientation noise of a table's sensor, one sigma per axis [default: 0.005]
     #[arg(long = "attitude-noise-deg", value_name = "DEG", allow_negative_numbers = true)]
     pub(crate) orientation_noise_deg: Option<f64>,
-    /// How three angles of a table make an orientation: rpy (URDF, ROS), abc (KUKA), wpr (FANUC), rotvec (Universal Robots), or the order of
-    /// the turns, such as xyz about fixed axes or ZYX about moving ones
-    #[arg(long, value_name = "CONVENTION")]
-    pub(crate) euler: Option<String>,
+    #[command(flatten)]
+    pub(crate) layout: LayoutOptions,
     /// Ticks of the joints' encoders per turn, for columns q1_ticks …
     #[arg(long, value_name = "N")]
     pub(crate) ticks_per_turn: Option<f64>,
-    /// Columns of a table that are not to be read
-    #[arg(long, value_name = "NAME", value_delimiter = ',')]
-    pub(crate) ignore_columns: Vec<String>,
     /// Known distances of fixed points: point_a,point_b,distance_mm,sigma_mm
     #[arg(long, value_name = "FILE")]
     pub(crate) distances: Option<PathBuf>,
@@ -347,12 +354,8 @@ pub(crate) struct CorrectOptions {
     /// Link that is to be there [default: the only leaf]
     #[arg(long, value_name = "LINK")]
     pub(crate) tip_link: Option<String>,
-    /// How three angles make an orientation, as for `kincal identify`
-    #[arg(long, value_name = "CONVENTION")]
-    pub(crate) euler: Option<String>,
-    /// Columns that are not to be read
-    #[arg(long, value_name = "NAME", value_delimiter = ',')]
-    pub(crate) ignore_columns: Vec<String>,
+    #[command(flatten)]
+    pub(crate) layout: LayoutOptions,
 }
 
 #[derive(Debug, Args)]

@@ -8,22 +8,14 @@ use super::arguments::{CorrectOptions, Global};
 use super::output;
 use crate::arm::frames::Pose;
 use crate::arm::inverse::reach;
-use crate::arm::{JointKind, urdf};
+use crate::arm::urdf;
 use crate::measurement::table;
 use crate::report;
 
 pub(crate) fn command(global: &Global, options: &CorrectOptions) -> anyhow::Result<Outcome> {
     let imported = urdf::read(&options.robot, options.base_link.as_deref(), options.tip_link.as_deref())?;
     let arm = imported.arm;
-    let euler =
-        options.euler.as_ref().map(|text| text.parse().map_err(|wrong| anyhow::anyhow!("--euler {wrong}"))).transpose()?;
-    let reading = table::Reading {
-        joints: arm.chain.joints.iter().map(|joint| (joint.name.clone(), joint.kind == JointKind::Prismatic)).collect(),
-        euler,
-        ignored: options.ignore_columns.clone(),
-        poses_only: true,
-        ..table::Reading::default()
-    };
+    let reading = table::Reading { poses_only: true, ..super::input::reading(&arm, &options.layout)? };
     let table = table::read_as(&options.targets, &reading)?;
     let count = arm.joint_count();
     let given = table.joint_factor.len();

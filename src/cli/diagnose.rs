@@ -152,7 +152,8 @@ fn subject(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Subject
             }
         };
     }
-    let input::Front { start, real, arm, mut table, mut notes } = input::front("diagnose", &options.input, &options.robot)?;
+    let input::Front { start, real, arm, mut table, mut notes } =
+        input::front("diagnose", &options.input, &options.robot, &settings(&Settings::default(), &options.set)?.model)?;
     // An effect is looked for about joints as they stand.
     for row in &mut table.measurements {
         row.joints.iter_mut().zip(&real.zeros).for_each(|(value, zero)| *value += zero);

@@ -10,7 +10,10 @@ use super::arguments::{Global, IdentifyOptions};
 use super::input;
 use super::output::{self, Audience};
 use crate::arm::Arm;
+use crate::diagnosis::rows::check_robot;
+use crate::diagnosis::settings::Model;
 use crate::event::{self, Event, RealCell, Start};
+use crate::identification::mistake::Said;
 use crate::measurement::{Measurement, Role, table};
 use crate::progress::Progress as _;
 use crate::{recording, report, scene, session};
@@ -25,6 +28,13 @@ fn from_recording(global: &Global, options: &IdentifyOptions) -> anyhow::Result<
     if let Some(real) = start.real {
         let start = Start { real: Some(real.clone()), ..session::start_event("identify", &start.scene) };
         let nominal = session::real_robot(&start, &real).with_context(|| options.input.display().to_string())?;
+        if real.zeros.is_empty() {
+            // A table was looked at when it was read.
+            let fitted: Vec<&Measurement> = measurements.iter().filter(|row| row.role == Role::Fit).collect();
+            let sensor = session::real_sensor(&real, &measurements);
+            check_robot(&nominal.0, &sensor, &fitted, &Model::default(), &Said::default())
+                .with_context(|| options.input.display().to_string())?;
+        }
         return real_cell(global, options, start, &real, nominal, measurements);
     }
     let file = scene::parse(&start.scene, &format!("{} (scene)", options.input.display()))?;
@@ -43,7 +53,8 @@ fn from_recording(global: &Global, options: &IdentifyOptions) -> anyhow::Result<
 }
 
 fn from_table(global: &Global, options: &IdentifyOptions) -> anyhow::Result<Outcome> {
-    let input::Front { start, real, arm, table, notes } = input::front("identify", &options.input, &options.robot)?;
+    let input::Front { start, real, arm, table, notes } =
+        input::front("identify", &options.input, &options.robot, &Model::default())?;
     let unused: Vec<&str> =
         table.conditions.iter().map(String::as_str).filter(|name| !table::TO_IDENTIFY.contains(name)).collect();
     if !unused.is_empty() {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, bail, ensure};
 
-use super::arguments::{Global, RobotOptions};
+use super::arguments::{Global, LayoutOptions, RobotOptions};
 use super::output;
 use crate::arm::Arm;
 use crate::arm::{JointKind, urdf};
@@ -81,8 +81,8 @@ pub(crate) struct Front {
 }
 
 /// The one door through which tables come in: reads `path` and its robot, applies the corrections of the command line, and refuses what
-/// cannot be of this robot with what would explain it.
-pub(crate) fn front(command: &str, path: &Path, options: &RobotOptions) -> anyhow::Result<Front> {
+/// cannot be of this robot (as `model` decides it) with what would explain it.
+pub(crate) fn front(command: &str, path: &Path, options: &RobotOptions, model: &Model) -> anyhow::Result<Front> {
     let robot = robot_of_table(path, options)?;
     let (start, mut real) = described(command, robot, options)?;
     let (arm, mut notes) = session::real_robot(&start, &real).with_context(|| robot.display().to_string())?;
@@ -106,7 +106,7 @@ pub(crate) fn front(command: &str, path: &Path, options: &RobotOptions) -> anyho
     let fitted: Vec<&Measurement> = table.measurements.iter().filter(|row| row.role == Role::Fit).collect();
     let sensor = session::real_sensor(&real, &table.measurements);
     // Parameters that are free enough explain wrong units, too.
-    match check_robot(&arm, &sensor, &fitted, &Model::default(), &said) {
+    match check_robot(&arm, &sensor, &fitted, model, &said) {
         Ok(()) => {}
         Err(wrong) => match wrong.explanations() {
             [only] if only.is_of_zeros() => {
@@ -140,24 +140,23 @@ pub(crate) fn corrected(table: &mut table::Table, arm: &Arm, options: &RobotOpti
     Ok((said, notes))
 }
 
+/// What is known of a table of `arm` before it is read.
+pub(crate) fn reading(arm: &Arm, layout: &LayoutOptions) -> anyhow::Result<table::Reading> {
+    let euler = layout.euler.as_ref().map(|text| text.parse().map_err(|wrong| anyhow::anyhow!("--euler {wrong}"))).transpose()?;
+    let joints = arm.chain.joints.iter().map(|joint| (joint.name.clone(), joint.kind == JointKind::Prismatic)).collect();
+    Ok(table::Reading { joints, euler, ignored: layout.ignore_columns.clone(), ..table::Reading::default() })
+}
+
 /// Reads the table of `input`, with gravity as it was said on the command line.
 pub(crate) fn read_table(path: &Path, arm: &Arm, options: &RobotOptions) -> anyhow::Result<table::Table> {
-    let euler =
-        options.euler.as_ref().map(|text| text.parse().map_err(|wrong| anyhow::anyhow!("--euler {wrong}"))).transpose()?;
     if let Some(ticks) = options.ticks_per_turn {
         ensure!(
             ticks.is_finite() && ticks.abs() >= 1.0,
             "--ticks-per-turn {ticks}: a number of at least 1 is needed, such as 4096"
         );
     }
-    let reading = table::Reading {
-        joints: arm.chain.joints.iter().map(|joint| (joint.name.clone(), joint.kind == JointKind::Prismatic)).collect(),
-        euler,
-        ticks_per_turn: options.ticks_per_turn,
-        ignored: options.ignore_columns.clone(),
-        poses_only: false,
-    };
-    let mut table = table::read_as(path, &reading)?;
+    let reading = reading(arm, &options.layout)?;
+    let mut table = table::read_as(path, &table::Reading { ticks_per_turn: options.ticks_per_turn, ..reading })?;
     if !options.gravity.is_empty() {
         let said = options.gravity.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
         let Ok(gravity) = <[f64; 3]>::try_from(options.gravity.as_slice()) else {
@@ -208,7 +207,8 @@ pub(crate) fn no_links(options: &RobotOptions, why: &str) -> anyhow::Result<()> 
 pub(crate) fn no_robot(options: &RobotOptions) -> anyhow::Result<()> {
     no_links(options, "a recording carries its own nominal arm; leave it out")?;
     ensure!(options.gravity.is_empty(), "--gravity: a recording has its own; leave it out");
-    let of_tables = options.euler.is_some() || options.ticks_per_turn.is_some() || !options.ignore_columns.is_empty();
+    let layout = &options.layout;
+    let of_tables = layout.euler.is_some() || options.ticks_per_turn.is_some() || !layout.ignore_columns.is_empty();
     ensure!(!of_tables, "--euler, --ticks-per-turn, --ignore-columns: a recording has been read already; leave them out");
     ensure!(options.distances.is_none(), "--distances: a recording has its own; leave it out");
     ensure!(options.fix_columns.is_empty(), "--fix-columns: a recording has been corrected already; leave it out");
