@@ -141,10 +141,10 @@ pub(crate) fn corrected(table: &mut table::Table, arm: &Arm, options: &RobotOpti
 }
 
 /// What is known of a table of `arm` before it is read.
-pub(crate) fn reading(arm: &Arm, layout: &LayoutOptions) -> anyhow::Result<table::Reading> {
+pub(crate) fn hints(arm: &Arm, layout: &LayoutOptions) -> anyhow::Result<table::Hints> {
     let euler = layout.euler.as_ref().map(|text| text.parse().map_err(|wrong| anyhow::anyhow!("--euler {wrong}"))).transpose()?;
     let joints = arm.chain.joints.iter().map(|joint| (joint.name.clone(), joint.kind == JointKind::Prismatic)).collect();
-    Ok(table::Reading { joints, euler, ignored: layout.ignore_columns.clone(), ..table::Reading::default() })
+    Ok(table::Hints { joints, euler, ignored: layout.ignore_columns.clone(), ..table::Hints::default() })
 }
 
 /// Reads the table of `input`, with gravity as it was said on the command line.
@@ -155,8 +155,8 @@ pub(crate) fn read_table(path: &Path, arm: &Arm, options: &RobotOptions) -> anyh
             "--ticks-per-turn {ticks}: a number of at least 1 is needed, such as 4096"
         );
     }
-    let reading = reading(arm, &options.layout)?;
-    let mut table = table::read_as(path, &table::Reading { ticks_per_turn: options.ticks_per_turn, ..reading })?;
+    let hints = hints(arm, &options.layout)?;
+    let mut table = table::read_as(path, &table::Hints { ticks_per_turn: options.ticks_per_turn, ..hints })?;
     if !options.gravity.is_empty() {
         let said = options.gravity.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
         let Ok(gravity) = <[f64; 3]>::try_from(options.gravity.as_slice()) else {

@@ -1,18 +1,12 @@
 //! What a table got wrong, as a correction that can be written on a command line and applied to its rows.
 
-use std::f64::consts::PI;
 use std::fmt;
 use std::str::FromStr;
 
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 use crate::measurement::Measurement;
-
-/// Units of length, m.
-pub(super) const LENGTHS: [(&str, f64); 6] =
-    [("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6), ("inch", 0.0254), ("ft", 0.3048)];
-/// Units of angle, rad.
-pub(super) const ANGLES: [(&str, f64); 4] = [("rad", 1.0), ("deg", PI / 180.0), ("turn", 2.0 * PI), ("mrad", 1e-3)];
+use crate::units::{ANGLES, LENGTHS, unit_named};
 
 /// A correction of a table. Joints and readings count from 0 here, from 1 in words.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,10 +65,6 @@ impl Default for Said {
     }
 }
 
-fn unit(units: &[(&'static str, f64)], name: &str) -> Option<(&'static str, f64)> {
-    units.iter().copied().find(|(known, _)| *known == name)
-}
-
 impl Fix {
     /// Applies it to `rows`, of an arm of whose joints `slides` says which slide.
     ///
@@ -130,7 +120,7 @@ impl Fix {
                 rows.iter_mut().for_each(|row| row.joints[*joint] += zero);
             }
             Fix::Angles(name) => {
-                let factor = unit(&ANGLES, name).map_or(1.0, |(_, unit)| unit) / said.angle;
+                let factor = unit_named(&ANGLES, name).map_or(1.0, |(_, unit)| unit) / said.angle;
                 for row in rows {
                     for (value, slides) in row.joints.iter_mut().zip(slides) {
                         *value *= if *slides { 1.0 } else { factor };
@@ -138,14 +128,14 @@ impl Fix {
                 }
             }
             Fix::Positions(name) => {
-                let unit = unit(&LENGTHS, name).map_or(1.0, |(_, unit)| unit);
+                let unit = unit_named(&LENGTHS, name).map_or(1.0, |(_, unit)| unit);
                 for row in rows {
                     (0..3).for_each(|axis| row.position_m[axis] *= unit / said.position[axis]);
                 }
             }
             Fix::Scale(factor) => rows.iter_mut().for_each(|row| row.position_m = row.position_m.map(|value| value * factor)),
             Fix::PositionsOf(axis, name) => {
-                let unit = unit(&LENGTHS, name).map_or(1.0, |(_, unit)| unit);
+                let unit = unit_named(&LENGTHS, name).map_or(1.0, |(_, unit)| unit);
                 rows.iter_mut().for_each(|row| row.position_m[*axis] *= unit / said.position[*axis]);
             }
             Fix::Axes(axes) => {
@@ -331,7 +321,7 @@ impl FromStr for Fix {
         let list = || how.split(',').map(number).collect::<Option<Vec<usize>>>().ok_or_else(wrong);
         let pair = || how.split_once('=').and_then(|(joint, value)| Some((number(joint)?, value.trim()))).ok_or_else(wrong);
         let finite = |text: &str| text.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(wrong);
-        let of_unit = |units: &[(&'static str, f64)]| unit(units, how).map(|(name, _)| name).ok_or_else(wrong);
+        let of_unit = |units: &[(&'static [&'static str], f64)]| unit_named(units, how).map(|(name, _)| name).ok_or_else(wrong);
         Ok(match what {
             "order" => Fix::Order(list()?),
             "reverse" => Fix::Reverse(list()?),

@@ -20,6 +20,7 @@ use super::standing;
 use crate::arm::frames::Pose;
 use crate::arm::{Arm, ChainAt};
 use crate::measurement::Measurement;
+use crate::units::{ANGLES, LENGTHS};
 
 /// Readings that are looked at, spread over all of them.
 const LOOKED_AT: usize = 60;
@@ -305,7 +306,8 @@ impl Search<'_> {
     fn conventions(&self, start: &Trial) -> Vec<Trial> {
         let mut fixes: Vec<Fix> = Vec::new();
         let same = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-9;
-        for (name, unit) in fix::LENGTHS {
+        for (names, unit) in LENGTHS {
+            let name = names[0];
             if !self.said.position.iter().all(|said| same(*said, unit)) {
                 fixes.push(Fix::Positions(name));
             }
@@ -315,7 +317,8 @@ impl Search<'_> {
                 }
             }
         }
-        for (name, unit) in fix::ANGLES {
+        for (names, unit) in ANGLES {
+            let name = names[0];
             if !same(self.said.angle, unit) {
                 fixes.push(Fix::Angles(name));
             }

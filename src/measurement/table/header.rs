@@ -1,8 +1,7 @@
 //! The header of a table: what each column is about, and in which unit, under the names that people give them.
 
-use std::f64::consts::PI;
-
-use super::Reading;
+use super::Hints;
+use crate::units::{ANGLES, LENGTHS, unit_named};
 
 /// What a column is about.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,19 +62,6 @@ pub(super) const ALLOWED: &str = "pose_id, time_s, q1_rad… (or _deg, _m, _mm, 
                                   temp1_c…, payload_kg, dwell_s, session, gravity_x, gravity_y, gravity_z; joints may have their names in \
                                   the robot's file, units may stand in brackets";
 
-const LENGTHS: [(&[&str], f64); 5] = [
-    (&["m", "meter", "meters", "metre", "metres"], 1.0),
-    (&["mm", "millimeter", "millimeters", "millimetre", "millimetres"], 1e-3),
-    (&["cm"], 1e-2),
-    (&["um", "µm", "micron", "microns"], 1e-6),
-    (&["in", "inch", "inches"], 0.0254),
-];
-const ANGLES: [(&[&str], f64); 2] = [(&["rad", "radian", "radians"], 1.0), (&["deg", "degree", "degrees", "°"], PI / 180.0)];
-
-fn factor(units: &[(&[&str], f64)], unit: &str) -> Option<f64> {
-    units.iter().find(|(names, _)| names.contains(&unit)).map(|(_, factor)| *factor)
-}
-
 /// The header as it was understood.
 #[derive(Debug)]
 pub(super) struct Header {
@@ -120,8 +106,8 @@ impl Name {
             return Name { base: base.trim_end_matches('_').to_owned(), unit: bracketed };
         }
         let is_unit = |unit: &str| {
-            factor(&LENGTHS, unit).is_some()
-                || factor(&ANGLES, unit).is_some()
+            unit_named(&LENGTHS, unit).is_some()
+                || unit_named(&ANGLES, unit).is_some()
                 || matches!(unit, "ticks" | "s" | "ms" | "us" | "ns")
         };
         match base.rsplit_once('_') {
@@ -163,8 +149,8 @@ fn meant(text: &str, joints: &[String], from_zero: bool) -> Meant {
         .and_then(|number| if from_zero { Some(number) } else { number.checked_sub(1) })
         .filter(|joint| *joint < 1000);
     if let Some(joint) = own.or(number) {
-        let as_length = unit.and_then(|unit| factor(&LENGTHS, unit));
-        let as_angle = unit.and_then(|unit| factor(&ANGLES, unit));
+        let as_length = unit.and_then(|unit| unit_named(&LENGTHS, unit).map(|(_, factor)| factor));
+        let as_angle = unit.and_then(|unit| unit_named(&ANGLES, unit).map(|(_, factor)| factor));
         return match (unit, as_length, as_angle) {
             (None, ..) => Meant::Joint(joint),
             (Some("ticks" | "counts"), ..) => Meant::Column(Column::Ticks { joint }),
@@ -178,7 +164,7 @@ fn meant(text: &str, joints: &[String], from_zero: bool) -> Meant {
     };
     let positions = ["", "p", "t", "pos_", "position_", "p_", "t_", "tcp_", "ee_", "translation_", "target_", "measured_"];
     if let Some(axis) = axis_of(&positions, ["x", "y", "z"]) {
-        return match unit.and_then(|unit| factor(&LENGTHS, unit)) {
+        return match unit.and_then(|unit| unit_named(&LENGTHS, unit).map(|(_, factor)| factor)) {
             Some(factor) => Meant::Column(Column::Position { axis, factor }),
             None => Meant::NoUnit(format!("{0}_m, {0}_mm or another length", ["x", "y", "z"][axis])),
         };
@@ -195,7 +181,7 @@ fn meant(text: &str, joints: &[String], from_zero: bool) -> Meant {
         // KUKA: A about z, B about y, C about x.
         .or_else(|| ["c", "b", "a"].iter().position(|name| base == *name));
     if let Some(axis) = turn {
-        return match unit.and_then(|unit| factor(&ANGLES, unit)) {
+        return match unit.and_then(|unit| unit_named(&ANGLES, unit).map(|(_, factor)| factor)) {
             Some(factor) => Meant::Column(Column::Euler { axis, factor }),
             None => Meant::NoUnit(format!("{base}_deg or {base}_rad")),
         };
@@ -247,13 +233,8 @@ impl Header {
     ///
     /// # Errors
     /// What is wrong, and what is allowed.
-    pub(super) fn new(
-        names: &csv::StringRecord,
-        joints: &[String],
-        slides: &[bool],
-        reading: &Reading,
-    ) -> Result<Header, String> {
-        let ignored = &reading.ignored;
+    pub(super) fn new(names: &csv::StringRecord, joints: &[String], slides: &[bool], hints: &Hints) -> Result<Header, String> {
+        let ignored = &hints.ignored;
         for (index, name) in names.iter().enumerate() {
             if !name.is_empty() && names.iter().take(index).any(|other| other == name) {
                 return Err(format!("column `{name}` stands there twice"));
@@ -304,7 +285,7 @@ impl Header {
         if from_zero {
             notes.push("joint columns are numbered from 0: the first joint is number 0 in the table, and 1 here".to_owned());
         }
-        Header::laid_out(columns, notes, reading.poses_only)
+        Header::laid_out(columns, notes, hints.poses_only)
     }
 
     fn laid_out(columns: Vec<Column>, notes: Vec<String>, poses_only: bool) -> Result<Header, String> {
@@ -409,17 +390,14 @@ fn numbered(columns: &[Column], number: impl Fn(&Column) -> Option<usize>) -> Re
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
 
     fn header(names: &[&str]) -> Result<Header, String> {
         let ignored = names.iter().filter(|name| **name == "note").map(|name| (*name).to_owned()).collect();
         let joints = ["shoulder_pan_joint".to_owned(), "elbow_joint".to_owned()];
-        Header::new(
-            &csv::StringRecord::from(names.to_vec()),
-            &joints,
-            &[false, false],
-            &Reading { ignored, ..Reading::default() },
-        )
+        Header::new(&csv::StringRecord::from(names.to_vec()), &joints, &[false, false], &Hints { ignored, ..Hints::default() })
     }
 
     #[test]

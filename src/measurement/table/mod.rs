@@ -164,7 +164,7 @@ const LARGEST: f64 = 1e13;
 
 /// What is known of a table beside its text.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Reading {
+pub struct Hints {
     /// Names of the robot's joints, which its columns may have, and which of them slide.
     pub joints: Vec<(String, bool)>,
     /// How three angles make an orientation.
@@ -237,14 +237,14 @@ impl Euler {
 /// # Errors
 /// If it cannot be read, or names the line and what is wrong with it.
 pub fn read(path: impl AsRef<Path>) -> Result<Table, TableError> {
-    read_as(path, &Reading::default())
+    read_as(path, &Hints::default())
 }
 
 /// The same with what is known of it.
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_as(path: impl AsRef<Path>, reading: &Reading) -> Result<Table, TableError> {
+pub fn read_as(path: impl AsRef<Path>, hints: &Hints) -> Result<Table, TableError> {
     let path = path.as_ref();
     let file = path.display().to_string();
     let unreadable = |source: std::io::Error| TableError::Unreadable { file: file.clone(), source };
@@ -258,7 +258,7 @@ pub fn read_as(path: impl AsRef<Path>, reading: &Reading) -> Result<Table, Table
     }
     let bytes = std::fs::read(path).map_err(unreadable)?;
     let decoded = text::decoded(&bytes).map_err(|(line, message)| TableError::Wrong { file: file.clone(), line, message })?;
-    parse_as(&decoded, &file, reading)
+    parse_as(&decoded, &file, hints)
 }
 
 /// Reads a table from `text`; `file` is its name in messages.
@@ -266,7 +266,7 @@ pub fn read_as(path: impl AsRef<Path>, reading: &Reading) -> Result<Table, Table
 /// # Errors
 /// Names the line and what is wrong with it.
 pub fn parse(text: &str, file: &str) -> Result<Table, TableError> {
-    parse_as(text, file, &Reading::default())
+    parse_as(text, file, &Hints::default())
 }
 
 /// Largest share of the rows that may be without a reading.
@@ -280,7 +280,7 @@ const SINCE_1970: f64 = 1e8;
 ///
 /// # Errors
 /// As [`parse`].
-pub fn parse_as(text: &str, file: &str, reading: &Reading) -> Result<Table, TableError> {
+pub fn parse_as(text: &str, file: &str, hints: &Hints) -> Result<Table, TableError> {
     let wrong = |line, message| TableError::Wrong { file: file.to_owned(), line, message };
     let layout = text::layout(text);
     let mut reader = csv::ReaderBuilder::new()
@@ -291,13 +291,13 @@ pub fn parse_as(text: &str, file: &str, reading: &Reading) -> Result<Table, Tabl
         .from_reader(text.as_bytes());
     let header = reader.headers().map_err(|error| wrong(1, error.to_string()))?.clone();
     let header_line = header.position().map_or(1, csv::Position::line);
-    let (names, slides): (Vec<String>, Vec<bool>) = reading.joints.iter().cloned().unzip();
+    let (names, slides): (Vec<String>, Vec<bool>) = hints.joints.iter().cloned().unzip();
     // A separator at the end of every line makes a column without a name.
     let trailing = header.len() > 1 && header.iter().next_back() == Some("");
     let header: csv::StringRecord = if trailing { header.iter().take(header.len() - 1).collect() } else { header };
-    let understood = Header::new(&header, &names, &slides, reading).map_err(|message| wrong(header_line, message))?;
+    let understood = Header::new(&header, &names, &slides, hints).map_err(|message| wrong(header_line, message))?;
     let Header { columns, notes, .. } = &understood;
-    let euler = match (understood.orientation, reading.euler) {
+    let euler = match (understood.orientation, hints.euler) {
         (Orientation::Euler, None) => {
             let message = "three angles make an orientation in many ways: say with --euler which, such as rpy (URDF, ROS), abc (KUKA), wpr \
                            (FANUC), rotvec (Universal Robots) or ZYX";
@@ -305,8 +305,8 @@ pub fn parse_as(text: &str, file: &str, reading: &Reading) -> Result<Table, Tabl
         }
         (_, euler) => euler.unwrap_or(Euler::Vector),
     };
-    let per_turn = reading.ticks_per_turn.unwrap_or(1.0);
-    if reading.ticks_per_turn.is_none() && columns.iter().any(|column| matches!(column, Column::Ticks { .. })) {
+    let per_turn = hints.ticks_per_turn.unwrap_or(1.0);
+    if hints.ticks_per_turn.is_none() && columns.iter().any(|column| matches!(column, Column::Ticks { .. })) {
         return Err(wrong(
             header_line,
             "columns of encoder ticks: say with --ticks-per-turn how many there are per turn of the joint".to_owned(),
@@ -729,8 +729,8 @@ mod tests {
         let vector = turn.scaled_axis();
         let of = |cells: String, euler: &str| {
             let text = format!("q1_rad,x_m,rx_rad,ry_rad,rz_rad\n0,0,{cells}\n");
-            let reading = Reading { euler: Some(euler.parse().unwrap()), ..Reading::default() };
-            parse_as(&text, "t.csv", &reading).unwrap().measurements[0].orientation().unwrap()
+            let hints = Hints { euler: Some(euler.parse().unwrap()), ..Hints::default() };
+            parse_as(&text, "t.csv", &hints).unwrap().measurements[0].orientation().unwrap()
         };
         for (cells, euler) in [
             (format!("{x},{y},{z}"), "rpy"),
