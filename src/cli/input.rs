@@ -12,7 +12,7 @@ use crate::diagnosis::rows::check_robot;
 use crate::diagnosis::settings::Model;
 use crate::event::{self, RealCell, Start};
 use crate::identification::mistake::{Fix, Said};
-use crate::measurement::{Measurement, Role, table};
+use crate::measurement::{Measurement, table};
 use crate::{recording, scene, session};
 
 /// Position noise that is assumed where none is declared, µm.
@@ -103,10 +103,11 @@ pub(crate) fn front(command: &str, path: &Path, options: &RobotOptions, model: &
     let (said, corrections) = corrected(&mut table, &arm, options)?;
     notes.extend(corrections);
     let slides = arm.slides();
-    let fitted: Vec<&Measurement> = table.measurements.iter().filter(|row| row.role == Role::Fit).collect();
+    // All rows, whatever they are for: a correction counts them as the table does.
+    let rows: Vec<&Measurement> = table.measurements.iter().collect();
     let sensor = session::real_sensor(&real, &table.measurements);
     // Parameters that are free enough explain wrong units, too.
-    match check_robot(&arm, &sensor, &fitted, model, &said) {
+    match check_robot(&arm, &sensor, &rows, model, &said) {
         Ok(()) => {}
         Err(wrong) => match wrong.explanations() {
             [only] if only.is_of_zeros() => {

@@ -119,7 +119,7 @@ struct Search<'a> {
     said: &'a Said,
 }
 
-/// The mistakes that explain `rows` best, the shortest sets first that do, the best of them first; none where nothing explains them.
+/// The mistakes that explain `rows` (all of a table: corrections count them) best, the shortest sets first that do, the best of them first; none where nothing explains them.
 #[must_use]
 pub fn explanations(arm: &Arm, said: &Said, rows: &[&Measurement]) -> Vec<Explanation> {
     let search = Search { chain: arm.chain.at_nominal(), slides: arm.slides(), said };
@@ -152,9 +152,8 @@ pub fn explanations(arm: &Arm, said: &Said, rows: &[&Measurement]) -> Vec<Explan
         if !good.is_empty() {
             return said_of(good, &search);
         }
-        found.retain(|trial| trial.rows.is_empty() || trial.fixes.len() > size);
-        beam = best_of(found.iter().filter(|trial| !trial.rows.is_empty()).cloned().collect(), BEAM);
-        found.clear();
+        let longer = found.drain(..).filter(|trial| !trial.rows.is_empty() && trial.fixes.len() > size);
+        beam = best_of(longer.collect(), BEAM);
     }
     Vec::new()
 }
