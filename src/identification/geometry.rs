@@ -4,7 +4,7 @@
 //! Base and target are free, each session may have a base of its own and each target on the tool has its place. Every joint frame but the
 //! first is off by six small errors ([`FrameErrors`]) with Gaussian priors of the size that machining and assembly leave.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3, Vector6};
 
 use super::least_squares::{difference, turn_to_residual};
 use super::prior::{Evidence, Sizes};
@@ -26,6 +26,9 @@ const CONFIGURATIONS: usize = 6;
 const STEPS: [usize; 2] = [30, 60];
 /// Rounds of fitting and weighing where readings are far off or the noise is not as declared.
 const ROUNDS: usize = 12;
+/// Rounds of weighing so that no reading pulls more than a typical one, and steps of each.
+const ROUNDS_OF_BOUNDED: usize = 30;
+const STEPS_OF_BOUNDED: usize = 3;
 /// Mean square of what is left, in declared sigmas, from which on it is taken for the noise in what the prior counts for.
 const LEVEL: f64 = 2.25;
 /// Change of a row's weight, and relative change of the level, that is nothing.
@@ -140,21 +143,40 @@ impl Geometry {
     /// Sizes of the frames' errors of which the readings are likeliest ([`super::prior`]).
     #[must_use]
     pub fn likeliest_sizes(&self) -> Sizes {
-        let sigma = libm::sqrt(self.level);
-        let residual = self.whitening.of_vector(&self.residual) / sigma;
-        let jacobian = self.whitening.of(&self.jacobian) / sigma;
+        let (residual, jacobian) = self.counted();
         let (of_distances, by_distances) = &self.distances;
         let evidence = Evidence {
             normal: gram(&jacobian) + gram(by_distances),
             with_residual: jacobian.tr_mul(&residual) + by_distances.tr_mul(of_distances),
             square: residual.norm_squared() + of_distances.norm_squared(),
-            equations: residual.len() + of_distances.len(),
+            equations: self.equations_that_count() + of_distances.len(),
             parameters: &self.placed.parameters,
             free: &self.free,
             group: Evidence::groups(&self.frames, self.placed.before, &self.free),
             sizes: self.placed.sizes,
         };
         evidence.likeliest()
+    }
+
+    /// Residuals and Jacobian in sigmas, those of readings that are far off as little as they count.
+    pub(super) fn counted(&self) -> (DVector<f64>, DMatrix<f64>) {
+        let sigma = libm::sqrt(self.level);
+        let mut residual = self.whitening.of_vector(&self.residual) / sigma;
+        let mut jacobian = self.whitening.of(&self.jacobian) / sigma;
+        for (row, far) in self.far.iter().enumerate().filter(|(_, far)| **far < 1.0) {
+            let factor = libm::sqrt(*far);
+            for equation in self.equations.of(row) {
+                residual[equation] *= factor;
+                jacobian.row_mut(equation).scale_mut(factor);
+            }
+        }
+        (residual, jacobian)
+    }
+
+    /// Equations of readings that are not far off.
+    fn equations_that_count(&self) -> usize {
+        let off: usize = (0..self.far.len()).filter(|row| self.far[*row] < robust::FAR).map(|row| self.equations.of(row).len()).sum();
+        self.residual.len() - off
     }
 
     /// The fitted parameters over the sigmas of their priors; zero where free.
@@ -353,7 +375,7 @@ impl Geometry {
     /// rad: bases, frames, targets, each base and target in its own frame. `None` where the equations do not tell.
     #[must_use]
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
-        let jacobian = self.whitening.of(&self.jacobian) / libm::sqrt(self.level);
+        let jacobian = self.counted().1;
         let mut normal = gram(&jacobian) + gram(&self.distances.1);
         (0..normal.nrows()).for_each(|at| normal[(at, at)] += 1.0);
         let mut covariance = normal.cholesky()?.inverse();
@@ -394,7 +416,8 @@ fn fit_with(
     let of_free: Vec<usize> = (0..problem.free.len()).filter(|column| problem.free[*column]).collect();
     // Base and target first: what is fitted with them far off would throw the frames about.
     let placed = problem.robustly(&of_free, start, STEPS[0]).point;
-    problem.whiten(&placed);
+    let all: Vec<usize> = (0..problem.free.len()).filter(|column| problem.sigma[*column] > 0.0).collect();
+    let placed = problem.bounded(&all, placed, STEPS_OF_BOUNDED);
     Ok(finish(problem, placed, sessions))
 }
 
@@ -715,6 +738,32 @@ impl<'a> Placing<'a> {
         self.session[row] * self.targets.len() + self.target[row]
     }
 
+    /// Measured minus predicted (m and rad) of a row, where the arm alone predicts `predicted`.
+    fn difference(&self, row: usize, placed: &Placed, mut predicted: Pose) -> Vector6<f64> {
+        if let Some([x, y, z, rx, ry, rz]) = self.readings.displacement.get(row) {
+            let turn = placed.measurement_from_root[self.session[row]].rotation;
+            predicted.translation.vector += turn * Vector3::new(*x, *y, *z);
+            predicted.rotation = rotation_from_vector(&(turn * Vector3::new(*rx, *ry, *rz))) * predicted.rotation;
+        }
+        if let Some(point) = self.point[row] {
+            predicted.translation.vector -= placed.points[point];
+        }
+        difference(self.readings.measurements[row], &predicted)
+    }
+
+    /// Residuals: measured minus predicted, m and rad.
+    fn residual(&self, placed: &Placed) -> DVector<f64> {
+        let chains = self.chains(placed);
+        let mut residual = DVector::zeros(self.equations.len());
+        for (row, measurement) in self.readings.measurements.iter().enumerate() {
+            let error = self.difference(row, placed, chains[self.chain_of(row)].0.forward(&measurement.joints));
+            for equation in self.equations.of(row) {
+                residual[equation] = error[self.equations.component(equation)];
+            }
+        }
+        residual
+    }
+
     /// Residuals (measured minus predicted, m and rad) and what one sigma of each parameter does to the predictions.
     fn raw(&self, placed: &Placed) -> (DVector<f64>, DMatrix<f64>) {
         let chains = self.chains(placed);
@@ -725,16 +774,7 @@ impl<'a> Placing<'a> {
         for (row, measurement) in self.readings.measurements.iter().enumerate() {
             let (chain, place) = &chains[self.chain_of(row)];
             let (axes, origin) = chain.jacobian_into(&measurement.joints, &mut buffer, columns);
-            let mut predicted = pose_from_parts(&axes, &origin);
-            if let Some([x, y, z, rx, ry, rz]) = self.readings.displacement.get(row) {
-                let turn = placed.measurement_from_root[self.session[row]].rotation;
-                predicted.translation.vector += turn * Vector3::new(*x, *y, *z);
-                predicted.rotation = rotation_from_vector(&(turn * Vector3::new(*rx, *ry, *rz))) * predicted.rotation;
-            }
-            if let Some(point) = self.point[row] {
-                predicted.translation.vector -= placed.points[point];
-            }
-            let error = difference(measurement, &predicted);
+            let error = self.difference(row, placed, pose_from_parts(&axes, &origin));
             turn_to_residual(&mut buffer[3 * columns..], columns, &error.fixed_rows::<3>(3).into_owned());
             for equation in self.equations.of(row) {
                 let component = self.equations.component(equation);
@@ -753,24 +793,19 @@ impl<'a> Placing<'a> {
         (residual, jacobian)
     }
 
-    /// Fits `columns` from `start`, weighs the rows by what is left and estimates the noise, until that changes no more. Where no row is far
-    /// off and the noise is as declared, this is one least squares.
+    /// Weighs the rows by what is left at `start`, fits `columns` from there and estimates the noise, until that changes no more. Where no
+    /// row is far off and the noise is as declared, this is one least squares.
     fn robustly(&mut self, columns: &[usize], start: Placed, most: usize) -> Fit<Placed> {
+        // A start that is off by itself tells which rows are further off, but not the noise.
+        self.far = self.far_off(&start).0;
+        self.whiten(&start);
         let mut fit = solve(self, columns, start, most);
-        let counts = self.equations.counts();
+        // While the frames are held, no prior counts.
+        let bound = columns.iter().any(|column| !self.free[*column]);
         for _ in 0..ROUNDS {
-            let left = self.raw(&fit.point).0;
-            let sensor = Whitening::new(&self.equations, inverse_sigmas(&self.equations), &vec![1.0; counts.len()]);
-            let whitened = sensor.of_vector(&left);
-            let squares: Vec<f64> =
-                (0..counts.len()).map(|row| whitened.rows_range(self.equations.of(row)).norm_squared()).collect();
-            let mut far = robust::weights(&squares, &counts);
-            far.iter_mut().filter(|weight| **weight >= robust::FAR).for_each(|weight| *weight = 1.0);
-            let level = robust::level(&squares, &counts);
-            // While the frames are held, no prior counts.
-            let level = if level > LEVEL && columns.iter().any(|column| !self.free[*column]) { level } else { 1.0 };
-            let before = |row: usize| self.far.get(row).copied().unwrap_or(1.0);
-            let same = far.iter().enumerate().all(|(row, weight)| (weight - before(row)).abs() < SETTLED)
+            let (far, level) = self.far_off(&fit.point);
+            let level = if level > LEVEL && bound { level } else { 1.0 };
+            let same = far.iter().zip(&self.far).all(|(weight, before)| (weight - before).abs() < SETTLED)
                 && (level / self.level - 1.0).abs() < SETTLED;
             if same {
                 break;
@@ -782,6 +817,40 @@ impl<'a> Placing<'a> {
             fit.steps += steps;
         }
         fit
+    }
+
+    /// From `start`, where no reading pulls more than a typical one: what a fit that leaves out readings can begin with.
+    fn bounded(&mut self, columns: &[usize], start: Placed, most: usize) -> Placed {
+        let counts = self.equations.counts();
+        let mut point = start;
+        for _ in 0..ROUNDS_OF_BOUNDED {
+            let weights = robust::bounded(&self.squares(&point), &counts);
+            let same = self.far.len() == weights.len()
+                && weights.iter().zip(&self.far).all(|(weight, before)| (weight - before).abs() < SETTLED);
+            if same {
+                break;
+            }
+            self.far = weights;
+            self.whiten(&point);
+            point = solve(self, columns, point, most).point;
+        }
+        point
+    }
+
+    /// Square of each row's residual in declared sigmas.
+    fn squares(&self, placed: &Placed) -> Vec<f64> {
+        let counts = self.equations.counts();
+        let sensor = Whitening::new(&self.equations, inverse_sigmas(&self.equations), &vec![1.0; counts.len()]);
+        let whitened = sensor.of_vector(&self.residual(placed));
+        (0..counts.len()).map(|row| whitened.rows_range(self.equations.of(row)).norm_squared()).collect()
+    }
+
+    /// Weight of each row for how far off it is at `placed`, and the mean square of the noise over the declared one.
+    fn far_off(&self, placed: &Placed) -> (Vec<f64>, f64) {
+        let (counts, squares) = (self.equations.counts(), self.squares(placed));
+        let mut far = robust::weights(&squares, &counts);
+        far.iter_mut().filter(|weight| **weight >= robust::FAR).for_each(|weight| *weight = 1.0);
+        (far, robust::level(&squares, &counts))
     }
 
     /// Whitens with what scatter does about `placed`.

@@ -146,9 +146,7 @@ struct LeftOut {
 /// Errors of `geometry` on readings of configurations that were left out, to first order about the fit of all: without fold k the parameters
 /// change by `-(N - N_k + 1)^-1 J_k' r_k`.
 fn left_out(geometry: &Geometry, readings: Readings<'_>, good: &[bool]) -> LeftOut {
-    let sigma = libm::sqrt(geometry.level);
-    let jacobian = geometry.whitening.of(&geometry.jacobian) / sigma;
-    let residual = geometry.whitening.of_vector(&geometry.residual) / sigma;
+    let (residual, jacobian) = geometry.counted();
     let mut normal = gram(&jacobian) + gram(&geometry.known().1);
     (0..normal.nrows()).for_each(|at| normal[(at, at)] += 1.0);
     let fold_of = folds(readings);

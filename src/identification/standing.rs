@@ -20,6 +20,10 @@ const DISTANCES: [f64; 3] = [0.1, 0.3, 1.0];
 const ROUNDS: [usize; 2] = [6, 60];
 /// Trials that are followed to the end.
 const FOLLOWED: usize = 3;
+/// Rounds of leaving out readings that are far off.
+const ROUNDS_OF_MOST: usize = 20;
+/// How far a reading may be off over the median of all distances, before it is left out of the start.
+const FAR_OFF: f64 = 3.0;
 /// Keeps the target where nothing tells it, next to sums over readings of about one.
 const DAMPING: f64 = 1e-9;
 
@@ -44,9 +48,10 @@ impl Standing {
     }
 }
 
-/// One reading: the tool in root, the target's measured position and orientation, and which target.
+/// One reading: its row, the tool in root, the target's measured position and orientation, and which target.
 #[derive(Clone, Copy, Debug)]
 struct Sight {
+    row: usize,
     tool: Pose,
     axes: Matrix3<f64>,
     position: Vector3<f64>,
@@ -69,6 +74,7 @@ fn stand_of(rows: &[usize], tools: &[Pose], measurements: &[&Measurement], targe
     let sights: Vec<Sight> = rows
         .iter()
         .map(|row| Sight {
+            row: *row,
             tool: tools[*row],
             axes: tools[*row].rotation.to_rotation_matrix().into_inner(),
             position: measurements[*row].position().coords,
@@ -76,15 +82,44 @@ fn stand_of(rows: &[usize], tools: &[Pose], measurements: &[&Measurement], targe
             target: target[*row],
         })
         .collect();
-    let near = placed(&sights, &vec![Vector3::zeros(); targets]);
+    let mut kept = sights.clone();
+    let mut found = stand_once(&kept, targets)?;
+    // A reading that is a metre off would carry the base along: those that are far from where most of them are go out, and come back
+    // where the next start has them near.
+    for _ in 0..ROUNDS_OF_MOST {
+        let off = distances(&sights, &found);
+        let mut sorted = off.clone();
+        sorted.sort_by(f64::total_cmp);
+        let limit = FAR_OFF * sorted[sorted.len() / 2];
+        let near: Vec<Sight> = sights.iter().zip(&off).filter(|(_, off)| **off <= limit).map(|(sight, _)| *sight).collect();
+        let same = near.len() == kept.len() && near.iter().zip(&kept).all(|(a, b)| a.row == b.row);
+        let every_target = (0..targets).all(|target| near.iter().any(|sight| sight.target == target));
+        if same || !every_target {
+            break;
+        }
+        let Some(next) = stand_once(&near, targets) else {
+            break;
+        };
+        (kept, found) = (near, next);
+    }
+    Some(with_orientations(found, &kept))
+}
+
+fn stand_once(sights: &[Sight], targets: usize) -> Option<Standing> {
+    let near = placed(sights, &vec![Vector3::zeros(); targets]);
     if let Some(near) = near.filter(|near| near.share() < SURE) {
-        return Some(with_orientations(near, &sights));
+        return Some(near);
     }
     let step = sights.len().div_ceil(LOOKED_AT).max(1);
     let few: Vec<Sight> = sights.iter().step_by(step).copied().collect();
     let best = of_orientations(&few, targets).into_iter().chain(of_positions(&few, targets));
-    let best = best.min_by(|a, b| a.left_m.total_cmp(&b.left_m))?;
-    Some(with_orientations(best, &sights))
+    best.min_by(|a, b| a.left_m.total_cmp(&b.left_m))
+}
+
+/// How far off each reading is, m.
+fn distances(sights: &[Sight], found: &Standing) -> Vec<f64> {
+    let target = |sight: &Sight| sight.tool * nalgebra::Point3::from(found.tool_from_target[sight.target].translation.vector);
+    sights.iter().map(|sight| ((found.measurement_from_root * target(sight)).coords - sight.position).norm()).collect()
 }
 
 /// Places the base where the targets are at `offsets` on the tool.
@@ -140,14 +175,15 @@ fn of_positions(sights: &[Sight], targets: usize) -> Option<Standing> {
 
 /// Places the base given the targets and these given the base, `rounds` times.
 pub(super) fn in_turn_of(tools: &[Pose], positions: &[Vector3<f64>], rounds: usize) -> Option<Standing> {
-    let sight = |(tool, position): (&Pose, &Vector3<f64>)| Sight {
+    let sight = |(row, (tool, position)): (usize, (&Pose, &Vector3<f64>))| Sight {
+        row,
         tool: *tool,
         axes: tool.rotation.to_rotation_matrix().into_inner(),
         position: *position,
         orientation: None,
         target: 0,
     };
-    let sights: Vec<Sight> = tools.iter().zip(positions).map(sight).collect();
+    let sights: Vec<Sight> = tools.iter().zip(positions).enumerate().map(sight).collect();
     in_turn(&sights, vec![Vector3::zeros()], rounds)
 }
 

@@ -50,6 +50,15 @@ fn by_size(squares: &[f64], counts: &[usize]) -> Vec<f64> {
     squares.iter().zip(counts).map(weight).collect()
 }
 
+/// Weights with which no reading pulls more than a typical one does (Huber's, with half of the readings beyond the bend): the loss is
+/// convex, so that a fit with them ends at the same place wherever it starts, and good readings outvote bad ones.
+#[must_use]
+pub(crate) fn bounded(squares: &[f64], counts: &[usize]) -> Vec<f64> {
+    let level = level(squares, counts);
+    let weight = |(square, count): (&f64, &usize)| libm::sqrt((level * median(*count) / square.max(1e-300)).min(1.0));
+    squares.iter().zip(counts).map(weight).collect()
+}
+
 /// Which readings are far off in a run of neighbours, in the order of measuring, that is longer than chance would have it: a step, or
 /// another session, and no errors of single readings.
 #[must_use]
