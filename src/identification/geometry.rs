@@ -14,7 +14,7 @@ use crate::arm::frames::{Pose, pose_from_parts, registration, rotation_from_vect
 use crate::arm::{Arm, ChainAt};
 use crate::measurement::equations::{COMPONENTS, Equations};
 use crate::measurement::{Distance, Measurement, Sensor};
-use crate::numerics::gram;
+use crate::numerics::{self, gram};
 use crate::solver::whitening::Whitening;
 use crate::solver::{Fit, Linearised, Problem, Stop, robust, solve};
 
@@ -171,6 +171,30 @@ impl Geometry {
             }
         }
         (residual, jacobian)
+    }
+
+    /// Square of how far each row is off from what a fit without it says, in sigmas of that: what is left of a row that was fitted is
+    /// smaller than its error, by the row's leverage. None where the equations do not tell.
+    pub(super) fn squares_without(&self) -> Option<Vec<f64>> {
+        let (residual, jacobian) = self.counted();
+        let mut normal = gram(&jacobian) + gram(&self.distances.1);
+        (0..normal.nrows()).for_each(|at| normal[(at, at)] += 1.0);
+        let inverse = normal.cholesky()?.inverse();
+        let of_row = |row: usize| {
+            let equations = self.equations.of(row);
+            let left = residual.rows_range(equations.clone());
+            let far = self.far.get(row).copied().unwrap_or(1.0);
+            if far < robust::FAR {
+                return Some(left.norm_squared() / far.max(f64::MIN_POSITIVE));
+            }
+            let own = jacobian.rows_range(equations);
+            let leverage = &own * numerics::product(&inverse, &own.transpose());
+            let rest = DMatrix::identity(left.len(), left.len()) - leverage;
+            // Where nothing but the row itself tells some parameter, nothing is known of its error.
+            let solved = rest.cholesky()?.solve(&left.into_owned());
+            Some(left.dot(&solved))
+        };
+        (0..self.equations.readings()).map(|row| of_row(row).or(Some(0.0))).collect()
     }
 
     /// Equations of readings that are not far off.

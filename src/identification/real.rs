@@ -23,6 +23,10 @@ const SAMPLES: usize = 60;
 const EXPRESSED: f64 = 1e-9;
 /// Least size of a prior that is reported of: what is held is known to this share of manufacturing.
 const LEAST_SIZE: f64 = 1e-6;
+/// Weight of a reading that is far off from what the others say: its square is twice the one that is rare.
+const FAR_FROM_OTHERS: f64 = 0.25;
+/// Rounds of fitting without the readings that are far off, and of looking which these are.
+const ROUNDS_OF_FAR: usize = 5;
 /// Readings that are far off of which the number is said, at most.
 const FAR_SAID: usize = 12;
 /// A combination whose standard error is above this share of what was known of it beforehand is told by that, not by the data.
@@ -55,18 +59,30 @@ pub fn identify_real(
     wishes: Wishes<'_>,
 ) -> Result<Identification, IdentificationError> {
     check_joints(robot, measurements)?;
-    let fit: Vec<&Measurement> = measurements.iter().filter(|row| row.role == Role::Fit).collect();
-    let climbed = climb_with(robot, sensor, &fit, wishes)?;
-    let far = far_off(sensor, measurements, &climbed.geometry.clone().with_points_of(measurements));
+    let near = |far: &[usize]| -> Vec<Measurement> {
+        measurements.iter().enumerate().filter(|(at, _)| !far.contains(at)).map(|(_, row)| row.clone()).collect()
+    };
+    let mut far: Vec<usize> = Vec::new();
+    let mut good = measurements.to_vec();
+    let mut climbed = climb_with(robot, sensor, &good, wishes)?;
+    for _ in 0..ROUNDS_OF_FAR {
+        let now = far_off(sensor, measurements, &good, &far, &climbed.geometry);
+        if now == far {
+            break;
+        }
+        far = now;
+        good = near(&far);
+        climbed = climb_with(robot, sensor, &good, wishes)?;
+    }
     if far.is_empty() {
         return tell(robot, sensor, measurements, wishes, climbed, Vec::new());
     }
-    let good: Vec<Measurement> = measurements
-        .iter()
-        .enumerate()
-        .filter(|(at, _)| !far.iter().any(|(row, _)| row == at))
-        .map(|(_, row)| row.clone())
-        .collect();
+    let geometry = climbed.geometry.clone().with_points_of(measurements);
+    let off = |row: &usize| {
+        let of = &measurements[*row];
+        (*row, super::least_squares::difference(of, &geometry.predict(of)).fixed_rows::<3>(0).norm())
+    };
+    let far: Vec<(usize, f64)> = far.iter().map(off).collect();
     let said = |(row, off): &(usize, f64)| format!("{} ({:.1} mm)", measurements[*row].index + 1, off * 1e3);
     let mut list: Vec<String> = far.iter().take(FAR_SAID).map(said).collect();
     if far.len() > FAR_SAID {
@@ -78,8 +94,6 @@ pub fn identify_real(
         measurements.len(),
         list.join(", ")
     );
-    let fit: Vec<&Measurement> = good.iter().filter(|row| row.role == Role::Fit).collect();
-    let climbed = climb_with(robot, sensor, &fit, wishes)?;
     let left_out = far.iter().map(|(row, off)| LeftOut { index: measurements[*row].index, off_m: *off }).collect();
     let mut notes = vec![note];
     notes.extend(exchanged(measurements, &far, &climbed.geometry, sensor));
@@ -105,10 +119,11 @@ fn exchanged(measurements: &[Measurement], far: &[(usize, f64)], geometry: &Geom
     if said.is_empty() { Vec::new() } else { vec![format!("{}: were rows exchanged, or a pose written twice?", said.join(", "))] }
 }
 
-fn climb_with(robot: &Arm, sensor: &Sensor, fit: &[&Measurement], wishes: Wishes<'_>) -> Result<Climbed, IdentificationError> {
+fn climb_with(robot: &Arm, sensor: &Sensor, rows: &[Measurement], wishes: Wishes<'_>) -> Result<Climbed, IdentificationError> {
+    let fit: Vec<&Measurement> = rows.iter().filter(|row| row.role == Role::Fit).collect();
     let weights = vec![1.0; fit.len()];
     let readings =
-        Readings { sensor, measurements: fit, weights: &weights, displacement: &[], scatter: &[], zeros: wishes.zeros };
+        Readings { sensor, measurements: &fit, weights: &weights, displacement: &[], scatter: &[], zeros: wishes.zeros };
     Ok(climb(robot, readings, wishes.only)?)
 }
 
@@ -156,19 +171,34 @@ pub fn identify_real_without_noise(
     Ok(identification)
 }
 
-/// Rows of `measurements` that are far off from what `geometry` says, and by how much (m).
-fn far_off(sensor: &Sensor, measurements: &[Measurement], geometry: &Geometry) -> Vec<(usize, f64)> {
+/// Rows of `measurements` that are far off from what others say, where `geometry` was fitted to those of `good` that are for fitting: all
+/// but the rows `left_out`.
+fn far_off(
+    sensor: &Sensor,
+    measurements: &[Measurement],
+    good: &[Measurement],
+    left_out: &[usize],
+    geometry: &Geometry,
+) -> Vec<usize> {
     let all: Vec<&Measurement> = measurements.iter().collect();
     let equations = Equations::new(sensor, &all);
-    let left: Vec<_> = all.iter().map(|row| super::least_squares::difference(row, &geometry.predict(row))).collect();
-    let square = |row: usize| -> f64 {
+    let known = geometry.clone().with_points_of(measurements);
+    let of_prediction = |row: usize| -> f64 {
+        let left = super::least_squares::difference(all[row], &known.predict(all[row]));
         let of = equations.of(row);
-        of.map(|equation| (left[row][equations.component(equation)] / equations.sigmas()[equation].max(1e-9)).powi(2)).sum()
+        of.map(|equation| (left[equations.component(equation)] / equations.sigmas()[equation].max(1e-9)).powi(2)).sum()
+    };
+    let of_fit = geometry.squares_without().unwrap_or_default();
+    let mut next = of_fit.into_iter();
+    let mut kept = good.iter();
+    let square = |row: usize| {
+        let fitted = !left_out.contains(&row) && kept.next().is_some_and(|row| row.role == Role::Fit);
+        let own = if fitted { next.next() } else { None };
+        own.unwrap_or_else(|| of_prediction(row))
     };
     let squares: Vec<f64> = (0..all.len()).map(square).collect();
     let weights = robust::weights(&squares, &equations.counts());
-    let far = (0..all.len()).filter(|row| weights[*row] < robust::FAR);
-    far.map(|row| (row, left[row].fixed_rows::<3>(0).norm())).collect()
+    (0..all.len()).filter(|row| weights[*row] < FAR_FROM_OTHERS).collect()
 }
 
 /// What `climbed` says of readings none of which is far off.
