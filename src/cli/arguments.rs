@@ -79,6 +79,14 @@ pub(crate) enum Command {
         and more than a fifth of the noise floor), its held-out RMS differs from theirs by more than that, or stays above the\n\
         diagnosis' own by more than half of it.")]
     Diagnose(DiagnoseOptions),
+    /// Make a table of measurements out of a bag of ROS 2
+    #[command(after_help = "Examples:\n  kincal import bag/ --robot ur5.urdf\n  \
+        kincal import bag.mcap --robot ur5.urdf --poses /tf:marker --out tables\n  \
+        kincal identify tables/bag.csv --robot ur5.urdf\n\n\
+        Joints are read from sensor_msgs/JointState by their names in the URDF; poses from PoseStamped, PoseWithCovarianceStamped,\n\
+        PointStamped, TransformStamped, Odometry and TFMessage. There is a row for each time that the arm stood still (the mean of what\n\
+        was read), or for each pose where it never did. Where the arm moves, the program finds by how much poses are stamped late.")]
+    Import(ImportOptions),
     /// Joint angles at which a calibrated robot reaches wanted poses
     #[command(after_help = "Example:\n  kincal correct --robot recordings/cell-identified.urdf --targets poses.csv\n\n\
         The table has x_mm, y_mm, z_mm (or _m) of the tip in the root's frame, and qx, qy, qz, qw or three angles (--euler) where orientations\n\
@@ -338,6 +346,33 @@ pub(crate) struct RobotOptions {
     /// Gravity in the robot's root link, m/s²: 9.81,0,0 for a robot on a wall, 0,0,9.81 for one that hangs [default: as the file has it]
     #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_negative_numbers = true)]
     pub(crate) gravity: Vec<f64>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ImportOptions {
+    /// Bag: an .mcap file, or the folder of one
+    pub(crate) bag: PathBuf,
+    /// Nominal robot (URDF or scene), whose joints are looked for by name
+    #[arg(long, value_name = "FILE")]
+    pub(crate) robot: PathBuf,
+    /// First link of the chain [default: the root]
+    #[arg(long, value_name = "LINK")]
+    pub(crate) base_link: Option<String>,
+    /// Last link of the chain [default: the only leaf]
+    #[arg(long, value_name = "LINK")]
+    pub(crate) tip_link: Option<String>,
+    /// Topic of the joint readings [default: /joint_states, or the only one]
+    #[arg(long, value_name = "TOPIC")]
+    pub(crate) joints: Option<String>,
+    /// Topic of the target's poses, TOPIC:FRAME in a TFMessage [default: the only one]
+    #[arg(long, value_name = "TOPIC")]
+    pub(crate) poses: Option<String>,
+    /// By how much poses are stamped late, s [default: what is found]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    pub(crate) latency: Option<f64>,
+    /// A row for each pose, though the arm stood still now and then
+    #[arg(long)]
+    pub(crate) moving: bool,
 }
 
 #[derive(Debug, Args)]

@@ -11,6 +11,7 @@ mod diagnose;
 mod effects;
 mod export;
 mod identify;
+mod import;
 mod input;
 mod measure;
 mod output;
@@ -77,7 +78,11 @@ fn dispatch(arguments: &Arguments) -> anyhow::Result<Outcome> {
     }
     if let (
         Some(seed),
-        Command::Correct(_) | Command::Diagnose(_) | Command::Identify(_) | Command::Replay(_) | Command::Export(_),
+        Command::Correct(_)
+        | Command::Diagnose(_)
+        | Command::Identify(_)
+        | Command::Import(_)
+        | Command::Replay(_) | Command::Export(_),
     ) = (global.seed, &arguments.command)
     {
         ensure!(
@@ -90,6 +95,7 @@ fn dispatch(arguments: &Arguments) -> anyhow::Result<Outcome> {
         Command::Run(options) => run::command(global, options),
         Command::Design(options) => design::command(global, options),
         Command::Measure(options) => measure::command(global, options),
+        Command::Import(options) => import::command(global, options),
         Command::Correct(options) => correct::command(global, options),
         Command::Diagnose(options) => diagnose::command(global, options),
         Command::Identify(options) => identify::command(global, options),

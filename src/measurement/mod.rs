@@ -1,6 +1,7 @@
 //! What a real cell would know of a measured configuration. There is no truth in here.
 
 pub mod equations;
+pub mod streams;
 pub mod table;
 
 use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};

@@ -6,6 +6,7 @@
 pub mod compare;
 pub mod encode;
 pub mod read;
+pub mod ros;
 pub mod schema;
 pub mod tables;
 pub mod topic;

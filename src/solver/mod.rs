@@ -1,5 +1,5 @@
-//! One least squares for everything that is fitted: Gauss–Newton, damped after Levenberg and Marquardt where a step fails, by QR of the
-//! stacked equations, with a Gaussian prior on the parameters where there is one.
+//! One least squares for everything that is fitted: Gauss–Newton, damped after Levenberg and Marquardt where a step fails, with a
+//! Gaussian prior on the parameters where there is one (by normal equations), else by QR.
 //!
 //! What is minimised is the sum of squares of a problem's weighted residuals and of the departures of its parameters from where the
 //! prior has them, both in sigmas. A step that raises it is never taken.
@@ -8,6 +8,8 @@ pub(crate) mod robust;
 pub mod whitening;
 
 use nalgebra::{DMatrix, DVector};
+
+use crate::numerics::gram;
 
 /// The fit has converged when an undamped step changes all predictions together by less than this many sigmas (of the noise, or of the
 /// residuals where these are larger).
@@ -160,33 +162,59 @@ fn scaled_square(jacobian: &DMatrix<f64>, step: &DVector<f64>) -> f64 {
     jacobian.column_iter().zip(step.iter()).map(|(column, value)| column.norm_squared() * value * value).sum()
 }
 
-/// The step that minimises the linearised residuals (and departures), by QR of the column-scaled Jacobian, damped after Levenberg and
-/// Marquardt. `None` where the equations do not tell.
+/// The step that minimises the linearised residuals (and departures), damped after Levenberg and Marquardt. `None` where the equations do
+/// not tell.
 fn step(
     jacobian: &DMatrix<f64>,
     residuals: &DVector<f64>,
     departures: Option<&DVector<f64>>,
     damping: f64,
 ) -> Option<DVector<f64>> {
+    match departures {
+        Some(departures) => step_with_prior(jacobian, residuals, departures, damping),
+        None => step_alone(jacobian, residuals, damping),
+    }
+}
+
+/// Normal equations: with a prior they are never singular, their rounding is far below what a step needs (the next one starts from
+/// the true residuals), and they cost a fraction of a QR.
+fn step_with_prior(
+    jacobian: &DMatrix<f64>,
+    residuals: &DVector<f64>,
+    departures: &DVector<f64>,
+    damping: f64,
+) -> Option<DVector<f64>> {
+    let mut normal = gram(jacobian);
+    let right = jacobian.tr_mul(residuals) - departures;
+    (0..normal.nrows()).for_each(|at| normal[(at, at)] = (normal[(at, at)] + 1.0) * (1.0 + damping));
+    // Columns of like length: the smallest parameter keeps its digits.
+    let scale: Vec<f64> = (0..normal.nrows()).map(|at| 1.0 / normal[(at, at)].sqrt()).collect();
+    for (column, of_column) in scale.iter().enumerate() {
+        for (row, of_row) in scale.iter().enumerate() {
+            normal[(row, column)] *= of_row * of_column;
+        }
+    }
+    let scaled = DVector::from_fn(right.len(), |at, _| right[at] * scale[at]);
+    let solved = normal.cholesky()?.solve(&scaled);
+    let step = DVector::from_fn(solved.len(), |at, _| solved[at] * scale[at]);
+    step.iter().all(|value| value.is_finite()).then_some(step)
+}
+
+/// By QR of the column-scaled Jacobian.
+fn step_alone(jacobian: &DMatrix<f64>, residuals: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
     let (rows, columns) = jacobian.shape();
-    let prior = departures.map_or(0, DVector::len);
-    let norms: Vec<f64> =
-        jacobian.column_iter().map(|column| if prior > 0 { libm::hypot(column.norm(), 1.0) } else { column.norm() }).collect();
+    let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
     let extra = if damping > 0.0 { columns } else { 0 };
-    let mut matrix = DMatrix::zeros(rows + prior + extra, columns);
-    let mut right = DVector::zeros(rows + prior + extra);
+    let mut matrix = DMatrix::zeros(rows + extra, columns);
+    let mut right = DVector::zeros(rows + extra);
     right.rows_mut(0, rows).copy_from(residuals);
     for (column, norm) in norms.iter().enumerate() {
         if !norm.is_finite() || *norm == 0.0 {
             return None;
         }
         matrix.view_mut((0, column), (rows, 1)).copy_from(&(jacobian.column(column) / *norm));
-        if let Some(departures) = departures {
-            matrix[(rows + column, column)] = 1.0 / *norm;
-            right[rows + column] = -departures[column];
-        }
         if damping > 0.0 {
-            matrix[(rows + prior + column, column)] = damping.sqrt();
+            matrix[(rows + column, column)] = damping.sqrt();
         }
     }
     let qr = matrix.qr();
