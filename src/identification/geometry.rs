@@ -173,28 +173,28 @@ impl Geometry {
         (residual, jacobian)
     }
 
-    /// Square of how far each row is off from what a fit without it says, in sigmas of that: what is left of a row that was fitted is
-    /// smaller than its error, by the row's leverage. None where the equations do not tell.
-    pub(super) fn squares_without(&self) -> Option<Vec<f64>> {
+    /// How far each row is off from what a fit without it says, in sigmas of that, equation by equation: what is left of a row that was fitted
+    /// is smaller than its error, by the row's leverage. None where the equations do not tell.
+    pub(super) fn errors_without(&self) -> Option<Vec<DVector<f64>>> {
         let (residual, jacobian) = self.counted();
         let mut normal = gram(&jacobian) + gram(&self.distances.1);
         (0..normal.nrows()).for_each(|at| normal[(at, at)] += 1.0);
         let inverse = normal.cholesky()?.inverse();
         let of_row = |row: usize| {
             let equations = self.equations.of(row);
-            let left = residual.rows_range(equations.clone());
+            let left = residual.rows_range(equations.clone()).into_owned();
             let far = self.far.get(row).copied().unwrap_or(1.0);
             if far < robust::FAR {
-                return Some(left.norm_squared() / far.max(f64::MIN_POSITIVE));
+                return left / libm::sqrt(far.max(f64::MIN_POSITIVE));
             }
-            let own = jacobian.rows_range(equations);
-            let leverage = &own * numerics::product(&inverse, &own.transpose());
-            let rest = DMatrix::identity(left.len(), left.len()) - leverage;
+            let own = jacobian.rows_range(equations).into_owned();
+            let leverage = &own * numerics::transposed_product(&inverse, &own.transpose());
             // Where nothing but the row itself tells some parameter, nothing is known of its error.
-            let solved = rest.cholesky()?.solve(&left.into_owned());
-            Some(left.dot(&solved))
+            let rest = (DMatrix::identity(left.len(), left.len()) - leverage).cholesky();
+            let error = rest.and_then(|factor| factor.l().solve_lower_triangular(&left));
+            error.unwrap_or_else(|| DVector::zeros(left.len()))
         };
-        (0..self.equations.readings()).map(|row| of_row(row).or(Some(0.0))).collect()
+        Some((0..self.equations.readings()).map(of_row).collect())
     }
 
     /// Equations of readings that are not far off.

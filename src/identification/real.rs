@@ -1,7 +1,7 @@
 //! The calibration of a real arm, whose frame of measurement and whose target nobody knows: the geometry that a diagnosis fits too
 //! ([`super::geometry`]), told in the parameters of the arm's own description.
 
-use nalgebra::{Cholesky, DMatrix};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::geometry::{FREE, Geometry, Readings};
 use super::ladder::{Climbed, Freedom, climb};
@@ -23,8 +23,11 @@ const SAMPLES: usize = 60;
 const EXPRESSED: f64 = 1e-9;
 /// Least size of a prior that is reported of: what is held is known to this share of manufacturing.
 const LEAST_SIZE: f64 = 1e-6;
-/// Weight of a reading that is far off from what the others say: its square is twice the one that is rare.
-const FAR_FROM_OTHERS: f64 = 0.25;
+/// Weight of a reading that is far off from what the others say where what is left is the declared noise, whose distribution is known: its
+/// square is twice the one that is rare. What no model explains has longer tails.
+const FAR_FROM_NOISE: f64 = 0.25;
+/// Mean square of what is left, in declared sigmas, up to which it is noise.
+const IS_NOISE: f64 = 1.5;
 /// Rounds of fitting without the readings that are far off, and of looking which these are.
 const ROUNDS_OF_FAR: usize = 5;
 /// Readings that are far off of which the number is said, at most.
@@ -58,6 +61,17 @@ pub fn identify_real(
     measurements: &[Measurement],
     wishes: Wishes<'_>,
 ) -> Result<Identification, IdentificationError> {
+    identify_with(robot, sensor, measurements, wishes, true)
+}
+
+/// As [`identify_real`]; whether the noise was `declared`.
+fn identify_with(
+    robot: &Arm,
+    sensor: &Sensor,
+    measurements: &[Measurement],
+    wishes: Wishes<'_>,
+    declared: bool,
+) -> Result<Identification, IdentificationError> {
     check_joints(robot, measurements)?;
     let near = |far: &[usize]| -> Vec<Measurement> {
         measurements.iter().enumerate().filter(|(at, _)| !far.contains(at)).map(|(_, row)| row.clone()).collect()
@@ -66,7 +80,7 @@ pub fn identify_real(
     let mut good = measurements.to_vec();
     let mut climbed = climb_with(robot, sensor, &good, wishes)?;
     for _ in 0..ROUNDS_OF_FAR {
-        let now = far_off(sensor, measurements, &good, &far, &climbed.geometry);
+        let now = far_off(sensor, measurements, &good, &far, &climbed.geometry, declared);
         if now == far {
             break;
         }
@@ -141,7 +155,7 @@ pub fn identify_real_without_noise(
     measurements: &[Measurement],
     wishes: Wishes<'_>,
 ) -> Result<Identification, IdentificationError> {
-    let first = identify_real(robot, sensor, measurements, wishes)?;
+    let first = identify_with(robot, sensor, measurements, wishes, false)?;
     let Some(scale) = first.residual_scale.filter(|scale| scale.is_finite()) else {
         return Ok(first);
     };
@@ -152,7 +166,7 @@ pub fn identify_real_without_noise(
         orientation_sigma_rad: sensor.orientation_sigma_rad.map(|sigma| scale * sigma),
         ..sensor.clone()
     };
-    let mut identification = identify_real(robot, &estimated, measurements, wishes)?;
+    let mut identification = identify_with(robot, &estimated, measurements, wishes, false)?;
     identification.noise_estimated = true;
     identification.notes.insert(
         0,
@@ -172,33 +186,44 @@ pub fn identify_real_without_noise(
 }
 
 /// Rows of `measurements` that are far off from what others say, where `geometry` was fitted to those of `good` that are for fitting: all
-/// but the rows `left_out`.
+/// but the rows `left_out`. `declared`: whether somebody said what the noise is.
 fn far_off(
     sensor: &Sensor,
     measurements: &[Measurement],
     good: &[Measurement],
     left_out: &[usize],
     geometry: &Geometry,
+    declared: bool,
 ) -> Vec<usize> {
     let all: Vec<&Measurement> = measurements.iter().collect();
     let equations = Equations::new(sensor, &all);
     let known = geometry.clone().with_points_of(measurements);
-    let of_prediction = |row: usize| -> f64 {
+    let of_prediction = |row: usize| -> DVector<f64> {
         let left = super::least_squares::difference(all[row], &known.predict(all[row]));
         let of = equations.of(row);
-        of.map(|equation| (left[equations.component(equation)] / equations.sigmas()[equation].max(1e-9)).powi(2)).sum()
+        let error = |equation: usize| left[equations.component(equation)] / equations.sigmas()[equation].max(1e-9);
+        DVector::from_iterator(of.len(), of.map(error))
     };
-    let of_fit = geometry.squares_without().unwrap_or_default();
-    let mut next = of_fit.into_iter();
+    let mut of_fit = geometry.errors_without().unwrap_or_default().into_iter();
     let mut kept = good.iter();
-    let square = |row: usize| {
+    let error = |row: usize| {
         let fitted = !left_out.contains(&row) && kept.next().is_some_and(|row| row.role == Role::Fit);
-        let own = if fitted { next.next() } else { None };
+        let own = if fitted { of_fit.next() } else { None };
         own.unwrap_or_else(|| of_prediction(row))
     };
-    let squares: Vec<f64> = (0..all.len()).map(square).collect();
-    let weights = robust::weights(&squares, &equations.counts());
-    (0..all.len()).filter(|row| weights[*row] < FAR_FROM_OTHERS).collect()
+    let errors: Vec<DVector<f64>> = (0..all.len()).map(error).collect();
+    // Position and orientation each by its own level: what is declared of one may be far from what is declared of the other.
+    let positions: Vec<usize> = (0..all.len()).map(|row| equations.of_position(row).len()).collect();
+    let orientations: Vec<usize> = (0..all.len()).map(|row| equations.of(row).len() - positions[row]).collect();
+    let far_in = |counts: &[usize], first: &dyn Fn(usize) -> usize| -> Vec<bool> {
+        let squares: Vec<f64> = (0..all.len()).map(|row| errors[row].rows(first(row), counts[row]).norm_squared()).collect();
+        let weights = robust::weights(&squares, counts);
+        let is_noise = declared && robust::level(&squares, counts) < IS_NOISE;
+        let limit = |row: usize| if is_noise && all[row].role == Role::Fit { FAR_FROM_NOISE } else { robust::FAR };
+        (0..all.len()).map(|row| counts[row] > 0 && weights[row] < limit(row)).collect()
+    };
+    let (by_position, by_orientation) = (far_in(&positions, &|_| 0), far_in(&orientations, &|row| positions[row]));
+    (0..all.len()).filter(|row| by_position[*row] || by_orientation[*row]).collect()
 }
 
 /// What `climbed` says of readings none of which is far off.
