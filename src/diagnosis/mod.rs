@@ -195,8 +195,9 @@ impl State {
     /// Nothing found; rows that are far off from what geometry makes of the others count little, as what they pull awry hides all else.
     fn robust(data: &Data<'_>) -> Result<State, DiagnosisError> {
         let state = State::nominal(data);
-        let rows::First { far, calibrated, .. } =
-            rows::first_fit(data.arm, data.sensor, data.measurements, &data.options.settings.model, &Said::default())?;
+        let first = rows::first_fit(data.arm, data.sensor, data.measurements, &data.options.settings.model, &Said::default())?;
+        let calibrated = first.calibrated(data.arm, data.sensor, data.measurements)?;
+        let far = first.far;
         Ok(State { far: if far.is_empty() { state.far } else { far }, calibrated, ..state })
     }
 

@@ -207,8 +207,8 @@ const FITS_BETTER: f64 = 0.5;
 pub(crate) struct First {
     /// Weight of each row for being far off from what the others say.
     pub(crate) far: Vec<f64>,
-    /// What a calibration leaves ([`crate::identification::identify_real`]), m and rad.
-    pub(crate) calibrated: DVector<f64>,
+    /// What was fitted.
+    loose: geometry::Geometry,
     /// What geometry leaves of readings that are not far off (RMS): of positions, m, and of orientations, rad.
     rms_m: f64,
     turn_rad: f64,
@@ -255,7 +255,19 @@ pub(crate) fn first_fit(
         let (hint, explanations) = mistake::hint(arm, said, measurements);
         return Err(DiagnosisError::NotThisGeometry { shift_mm: shift * 1e3, turn_deg: turn.to_degrees(), hint, explanations });
     }
-    Ok(First { far: rows.far, calibrated: geometry::shrunk_residual(arm, readings, &loose)?, rms_m: rms, turn_rad })
+    Ok(First { far: rows.far, loose, rms_m: rms, turn_rad })
+}
+
+impl First {
+    /// What a calibration of `arm` leaves of the same `measurements` ([`crate::identification::identify_real`]), m and rad.
+    ///
+    /// # Errors
+    /// As [`first_fit`].
+    pub(crate) fn calibrated(&self, arm: &Arm, sensor: &Sensor, measurements: &[&Measurement]) -> Result<DVector<f64>, DiagnosisError> {
+        let weights = vec![1.0; measurements.len()];
+        let readings = geometry::Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[], zeros: &[] };
+        Ok(geometry::shrunk_residual(arm, readings, &self.loose)?)
+    }
 }
 
 /// Fits base, target and geometry of `arm` to `readings`. Sessions get bases of their own where that is worth it.

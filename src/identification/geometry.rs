@@ -16,7 +16,7 @@ use crate::measurement::equations::{COMPONENTS, Equations};
 use crate::measurement::{Distance, Measurement, Sensor};
 use crate::numerics::{self, gram};
 use crate::solver::whitening::Whitening;
-use crate::solver::{Fit, Linearised, Problem, Stop, robust, solve};
+use crate::solver::{Fit, Linearised, Problem, STEP_TOLERANCE, Stop, robust, solve};
 
 /// Base and target are free: so wide, about where the fit finds them, that it never binds; m and rad.
 pub const FREE: f64 = 50e-3;
@@ -26,9 +26,12 @@ const CONFIGURATIONS: usize = 6;
 const STEPS: [usize; 2] = [30, 60];
 /// Rounds of fitting and weighing where readings are far off or the noise is not as declared.
 const ROUNDS: usize = 12;
-/// Rounds of weighing so that no reading pulls more than a typical one, and steps of each.
-const ROUNDS_OF_BOUNDED: usize = 30;
-const STEPS_OF_BOUNDED: usize = 3;
+/// Last step of a fit that another one follows, in sigmas of all predictions together: far below what the readings tell.
+const ROUGH: f64 = 1e-2;
+/// Rounds of weighing so that no reading pulls more than a typical one.
+const ROUNDS_OF_BOUNDED: usize = 40;
+/// Mean square over that of most readings from which on some are further off than normal noise would be.
+const LONG_TAILS: f64 = 1.2;
 /// Mean square of what is left, in declared sigmas, from which on it is taken for the noise in what the prior counts for.
 const LEVEL: f64 = 2.25;
 /// Change of a row's weight, and relative change of the level, that is nothing.
@@ -315,17 +318,26 @@ pub fn shrunk_residual(arm: &Arm, readings: Readings<'_>, loose: &Geometry) -> R
 /// # Errors
 /// As [`fit`].
 pub fn fit_at(arm: &Arm, readings: Readings<'_>, sizes: Sizes) -> Result<Geometry, GeometryError> {
+    fit_to(arm, readings, sizes, STEP_TOLERANCE)
+}
+
+/// As [`fit_at`], to where steps matter no more, but not further: for fits that another one follows.
+pub(super) fn fit_roughly(arm: &Arm, readings: Readings<'_>, sizes: Sizes) -> Result<Geometry, GeometryError> {
+    fit_to(arm, readings, sizes, ROUGH)
+}
+
+fn fit_to(arm: &Arm, readings: Readings<'_>, sizes: Sizes, tolerance: f64) -> Result<Geometry, GeometryError> {
     let (mut names, mut session) = numbered(readings.measurements, |row| row.session.as_deref());
     if readings.measurements.iter().all(|row| row.fixed_point.is_some()) {
         // Fixed points are in no frame but the arm's own.
         names.truncate(1);
         session.fill(0);
     }
-    let together = fit_with(arm, readings, &vec![0; session.len()], vec![String::new()], sizes)?;
+    let together = fit_with(arm, readings, &vec![0; session.len()], vec![String::new()], sizes, tolerance)?;
     if names.len() < 2 {
         return Ok(together);
     }
-    let apart = fit_with(arm, readings, &session, names.clone(), sizes)?;
+    let apart = fit_with(arm, readings, &session, names.clone(), sizes, tolerance)?;
     let added = (FrameErrors::PER_FRAME * (names.len() - 1)) as f64;
     let left = (apart.residual.len() as f64 - apart.jacobian.ncols() as f64).max(1.0);
     if (together.cost - apart.cost) / added < OWN_BASE * apart.cost / left {
@@ -356,6 +368,15 @@ impl Geometry {
     /// # Errors
     /// As [`fit`].
     pub fn refit(&self, arm: &Arm, readings: Readings<'_>, sizes: Sizes) -> Result<Geometry, GeometryError> {
+        self.refit_to(arm, readings, sizes, STEP_TOLERANCE)
+    }
+
+    /// As [`Geometry::refit`], to where steps matter no more, but not further.
+    pub(super) fn refit_roughly(&self, arm: &Arm, readings: Readings<'_>, sizes: Sizes) -> Result<Geometry, GeometryError> {
+        self.refit_to(arm, readings, sizes, ROUGH)
+    }
+
+    fn refit_to(&self, arm: &Arm, readings: Readings<'_>, sizes: Sizes, tolerance: f64) -> Result<Geometry, GeometryError> {
         let mut problem = Placing::new(arm, readings, &self.session, self.sessions.len(), sizes)?;
         let errors = self.placed.errors(&self.frames);
         let mut start = Placed { sizes, ..self.placed.clone() };
@@ -367,7 +388,7 @@ impl Geometry {
         }
         (problem.far, problem.level) = (self.far.clone(), self.level);
         problem.whiten(&start);
-        Ok(Geometry { notes: self.notes.clone(), ..finish(problem, start, self.sessions.clone()) })
+        Ok(Geometry { notes: self.notes.clone(), ..finish(problem, start, self.sessions.clone(), tolerance) })
     }
 
     /// Errors of the joint frames from the second on, six each (m, rad), in the frame in which the joint moves about or along z.
@@ -434,6 +455,7 @@ fn fit_with(
     session: &[usize],
     sessions: Vec<String>,
     sizes: Sizes,
+    tolerance: f64,
 ) -> Result<Geometry, GeometryError> {
     let mut problem = Placing::new(arm, readings, session, sessions.len(), sizes)?;
     let start = problem.start(arm)?;
@@ -441,17 +463,28 @@ fn fit_with(
     // Base and target first: what is fitted with them far off would throw the frames about.
     let placed = problem.robustly(&of_free, start, STEPS[0]).point;
     let all: Vec<usize> = (0..problem.free.len()).filter(|column| problem.sigma[*column] > 0.0).collect();
-    let placed = problem.bounded(&all, placed, STEPS_OF_BOUNDED);
-    Ok(finish(problem, placed, sessions))
+    // Errors that are larger than those of most readings, far off or hidden in the fit: they had better not pull at all.
+    let plain = problem.robustly(&all, placed.clone(), STEPS[1]).point;
+    let squares = problem.squares(&plain);
+    let counts = problem.equations.counts();
+    let mean = squares.iter().sum::<f64>() / counts.iter().sum::<usize>().max(1) as f64;
+    let outliers = mean > LONG_TAILS * robust::level(&squares, &counts);
+    let placed = if outliers { problem.bounded(&all, placed) } else { plain };
+    Ok(finish(problem, placed, sessions, tolerance))
 }
 
 /// Fits all that `problem` leaves free, from `start`.
-fn finish(mut problem: Placing<'_>, start: Placed, sessions: Vec<String>) -> Geometry {
+fn finish(mut problem: Placing<'_>, start: Placed, sessions: Vec<String>, tolerance: f64) -> Geometry {
     let free = problem.free.clone();
     let moves = |column: &usize| free[*column] || problem.sigma[*column] > 0.0;
     let all: Vec<usize> = (0..free.len()).filter(moves).collect();
     let mut fit = problem.robustly(&all, start, STEPS[1]);
     let mut steps = fit.steps;
+    if tolerance < problem.tolerance {
+        problem.tolerance = tolerance;
+        fit = problem.robustly(&all, fit.point, STEPS[1]);
+        steps += fit.steps;
+    }
     if !problem.readings.scatter.is_empty() {
         // What scatter does was that of the nominal arm.
         problem.whiten(&fit.point);
@@ -537,6 +570,8 @@ struct Placing<'a> {
     level: f64,
     /// Sizes of the frames' priors.
     sizes: Sizes,
+    /// Largest last step, see [`Problem::tolerance`].
+    tolerance: f64,
 }
 
 impl<'a> Placing<'a> {
@@ -588,6 +623,7 @@ impl<'a> Placing<'a> {
             far,
             level,
             sizes,
+            tolerance: ROUGH,
         })
     }
 
@@ -844,7 +880,7 @@ impl<'a> Placing<'a> {
     }
 
     /// From `start`, where no reading pulls more than a typical one: what a fit that leaves out readings can begin with.
-    fn bounded(&mut self, columns: &[usize], start: Placed, most: usize) -> Placed {
+    fn bounded(&mut self, columns: &[usize], start: Placed) -> Placed {
         let counts = self.equations.counts();
         let mut point = start;
         for _ in 0..ROUNDS_OF_BOUNDED {
@@ -856,7 +892,7 @@ impl<'a> Placing<'a> {
             }
             self.far = weights;
             self.whiten(&point);
-            point = solve(self, columns, point, most).point;
+            point = solve(self, columns, point, 1).point;
         }
         point
     }
@@ -953,6 +989,10 @@ impl Problem for Placing<'_> {
 
     fn one_sigma(&self) -> f64 {
         1.0
+    }
+
+    fn tolerance(&self) -> f64 {
+        self.tolerance
     }
 }
 

@@ -10,7 +10,7 @@ use nalgebra::DVector;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::geometry::{Geometry, GeometryError, Readings, fit_at};
+use super::geometry::{Geometry, GeometryError, Readings, fit_roughly};
 use super::prior::Sizes;
 use crate::arm::Arm;
 use crate::numerics::gram;
@@ -89,7 +89,7 @@ pub struct Climbed {
 /// # Errors
 /// If the readings cannot tell.
 pub fn climb(arm: &Arm, readings: Readings<'_>, only: Option<Freedom>) -> Result<Climbed, GeometryError> {
-    let loose = fit_at(arm, readings, LOOSE)?;
+    let loose = fit_roughly(arm, readings, LOOSE)?;
     let likeliest = loose.likeliest_sizes();
     // Rows that are far off for the whole geometry are for every part of it.
     let counts = loose.equations.counts();
@@ -99,11 +99,11 @@ pub fn climb(arm: &Arm, readings: Readings<'_>, only: Option<Freedom>) -> Result
         if only.is_some_and(|only| only != free) {
             continue;
         }
-        let mut geometry = loose.refit(arm, readings, free.of(likeliest))?;
+        let mut geometry = loose.refit_roughly(arm, readings, free.of(likeliest))?;
         if free != Freedom::BaseAndTarget && free != Freedom::Geometry {
             let sizes = geometry.likeliest_sizes();
             if sizes != geometry.sizes() {
-                geometry = geometry.refit(arm, readings, sizes)?;
+                geometry = geometry.refit_roughly(arm, readings, sizes)?;
             }
         }
         let left_out = left_out(&geometry, readings, &good);
@@ -117,7 +117,8 @@ pub fn climb(arm: &Arm, readings: Readings<'_>, only: Option<Freedom>) -> Result
         chosen: at == best,
     };
     let rungs = tried.iter().enumerate().map(rung).collect();
-    Ok(Climbed { geometry: tried.swap_remove(best).1, rungs })
+    let taken = tried.swap_remove(best).1;
+    Ok(Climbed { geometry: taken.refit(arm, readings, taken.sizes())?, rungs })
 }
 
 /// The rung up to which each is better than the best below it, by more than the standard error of the difference, row by row.
@@ -232,7 +233,7 @@ mod tests {
             let readings =
                 Readings { sensor: &sensor, measurements: rows, weights: &weights, displacement: &[], scatter: &[], zeros: &[] };
             let sizes = from.map_or(Sizes::MANUFACTURING, Geometry::sizes);
-            let geometry = fit_at(&arm, readings, sizes).unwrap();
+            let geometry = super::super::geometry::fit_at(&arm, readings, sizes).unwrap();
             let left = from.is_none().then(|| left_out(&geometry, readings, &[true; 50]));
             (geometry, left, folds(readings))
         };

@@ -13,7 +13,7 @@ use crate::numerics::gram;
 
 /// The fit has converged when an undamped step changes all predictions together by less than this many sigmas (of the noise, or of the
 /// residuals where these are larger).
-const STEP_TOLERANCE: f64 = 1e-6;
+pub(crate) const STEP_TOLERANCE: f64 = 1e-6;
 /// Relative change of the cost that counts as rounding.
 const ROUNDING: f64 = 1e-12;
 /// Damping from which on no step is worth trying.
@@ -32,6 +32,11 @@ pub trait Problem {
 
     /// Length of a weighted residual that is off by one sigma of the declared noise: what counts as nothing.
     fn one_sigma(&self) -> f64;
+
+    /// The fit has converged when an undamped step changes all predictions together by less than this many sigmas.
+    fn tolerance(&self) -> f64 {
+        STEP_TOLERANCE
+    }
 }
 
 /// A problem about one point.
@@ -126,7 +131,7 @@ pub fn solve_from<P: Problem>(problem: &P, columns: &[usize], start: P::Point, h
         let there = problem.linearise(&trial);
         let trial_cost = there.cost();
         let sigma = (cost / here.residuals.len() as f64).sqrt().max(problem.one_sigma());
-        let settled = change <= STEP_TOLERANCE * sigma;
+        let settled = change <= problem.tolerance() * sigma;
         let undamped = damping == 0.0;
         let rounding = cost * ROUNDING;
         if trial_cost.is_finite() && trial_cost <= cost + rounding {
