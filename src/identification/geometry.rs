@@ -14,7 +14,7 @@ use crate::arm::frames::{Pose, pose_from_parts, registration, rotation_from_vect
 use crate::arm::{Arm, ChainAt};
 use crate::measurement::equations::{COMPONENTS, Equations};
 use crate::measurement::{Distance, Measurement, Sensor};
-use crate::numerics::{self, gram};
+use crate::numerics::gram;
 use crate::solver::whitening::Whitening;
 use crate::solver::{Fit, Linearised, Problem, STEP_TOLERANCE, Stop, robust, solve};
 
@@ -182,7 +182,8 @@ impl Geometry {
         let (residual, jacobian) = self.counted();
         let mut normal = gram(&jacobian) + gram(&self.distances.1);
         (0..normal.nrows()).for_each(|at| normal[(at, at)] += 1.0);
-        let inverse = normal.cholesky()?.inverse();
+        // With the Cholesky factor L of the normal equations the leverage of rows J is (L^-1 J')' (L^-1 J').
+        let spread = normal.cholesky()?.l().solve_lower_triangular(&jacobian.transpose())?;
         let of_row = |row: usize| {
             let equations = self.equations.of(row);
             let left = residual.rows_range(equations.clone()).into_owned();
@@ -190,8 +191,8 @@ impl Geometry {
             if far < robust::FAR {
                 return left / libm::sqrt(far.max(f64::MIN_POSITIVE));
             }
-            let own = jacobian.rows_range(equations).into_owned();
-            let leverage = &own * numerics::transposed_product(&inverse, &own.transpose());
+            let own = spread.columns_range(equations);
+            let leverage = own.tr_mul(&own);
             // Where nothing but the row itself tells some parameter, nothing is known of its error.
             let rest = (DMatrix::identity(left.len(), left.len()) - leverage).cholesky();
             let error = rest.and_then(|factor| factor.l().solve_lower_triangular(&left));
@@ -945,9 +946,10 @@ impl Problem for Placing<'_> {
     type Point = Placed;
 
     fn linearise(&self, at: &Placed) -> Linearised {
-        let (residual, jacobian) = self.raw(at);
+        let (residual, mut jacobian) = self.raw(at);
         let sigma = libm::sqrt(self.level);
-        let (mut residuals, mut jacobian) = (self.whitening.of_vector(&residual) / sigma, self.whitening.of(&jacobian) / sigma);
+        let mut residuals = self.whitening.of_vector(&residual) / sigma;
+        self.whitening.apply_to(&mut jacobian, 1.0 / sigma);
         let (of_distances, by_distances) = self.distances(at);
         if !of_distances.is_empty() {
             let (read, known) = (residuals.len(), of_distances.len());

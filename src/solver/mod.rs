@@ -7,6 +7,8 @@
 pub(crate) mod robust;
 pub mod whitening;
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::numerics::gram;
@@ -121,12 +123,14 @@ pub fn solve_from<P: Problem>(problem: &P, columns: &[usize], start: P::Point, h
     // Damping and the factor by which it grows after a failure, after Nielsen 1999.
     let (mut damping, mut growth): (f64, f64) = (0.0, 2.0);
     for step_number in 1..=most {
-        let jacobian = here.jacobian.select_columns(columns);
+        let every = columns.len() == here.jacobian.ncols();
+        let jacobian = if every { Cow::Borrowed(&here.jacobian) } else { Cow::Owned(here.jacobian.select_columns(columns)) };
+        let jacobian = jacobian.as_ref();
         let departures = here.departures.as_ref().map(|departures| departures.select_rows(columns));
-        let Some(step) = step(&jacobian, &here.residuals, departures.as_ref(), damping) else {
+        let Some(step) = step(jacobian, &here.residuals, departures.as_ref(), damping) else {
             return Fit { point, linearised: here, stop: Stop::Singular, steps: step_number };
         };
-        let change = (&jacobian * &step).norm();
+        let change = (jacobian * &step).norm();
         let trial = problem.moved(&point, columns, &step);
         let there = problem.linearise(&trial);
         let trial_cost = there.cost();
@@ -137,7 +141,7 @@ pub fn solve_from<P: Problem>(problem: &P, columns: &[usize], start: P::Point, h
         if trial_cost.is_finite() && trial_cost <= cost + rounding {
             // Gain over what the linear model, with its prior and damping, promises.
             let of_prior = if departures.is_some() { step.norm_squared() } else { 0.0 };
-            let promised = change * change + of_prior + 2.0 * damping * scaled_square(&jacobian, &step);
+            let promised = change * change + of_prior + 2.0 * damping * scaled_square(jacobian, &step);
             let gain = if promised > 0.0 { (cost - trial_cost) / promised } else { 1.0 };
             damping *= (1.0 - (2.0 * gain - 1.0).powi(3)).clamp(0.1, 2.0);
             growth = 2.0;

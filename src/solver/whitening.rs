@@ -106,9 +106,27 @@ impl Whitening {
         self.of_rows(matrix, &rows)
     }
 
+    /// Whitens `matrix` (all equations) in place, and takes it times `factor`.
+    pub fn apply_to(&self, matrix: &mut DMatrix<f64>, factor: f64) {
+        for mut column in matrix.column_iter_mut() {
+            if self.blocks.is_empty() {
+                column.iter_mut().zip(self.diagonal.iter()).for_each(|(value, one)| *value *= one * factor);
+                continue;
+            }
+            for (row, block) in self.blocks.iter().enumerate() {
+                let mut own = column.rows_range_mut(self.equations_of(row));
+                let whitened = block * &own * factor;
+                own.copy_from(&whitened);
+            }
+        }
+    }
+
     /// `vector` (all equations), whitened.
     #[must_use]
     pub fn of_vector(&self, vector: &DVector<f64>) -> DVector<f64> {
+        if self.blocks.is_empty() {
+            return vector.component_mul(&self.diagonal);
+        }
         let values: Vec<f64> = (0..self.weights.len())
             .flat_map(|row| self.of_row(row, vector.rows_range(self.equations_of(row))).data.as_vec().clone())
             .collect();
@@ -168,6 +186,9 @@ mod tests {
         assert!((whitened - DMatrix::identity(6, 6)).norm() < 1e-12);
         let vector = DVector::from_vec(vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         let as_matrix = whitening.of(&DMatrix::from_column_slice(6, 1, vector.as_slice()));
+        let mut in_place = DMatrix::from_column_slice(6, 1, vector.as_slice());
+        whitening.apply_to(&mut in_place, 0.5);
+        assert!((in_place * 2.0 - &as_matrix).norm() < 1e-12);
         assert!((whitening.of_vector(&vector) - as_matrix.column(0)).norm() < 1e-12);
         assert!((whitening.of_rows(&all, &[1]) - whitening.of(&all).rows(3, 3)).norm() < 1e-12);
         let flat = Measurement { unread: [false, false, true], ..reading };
