@@ -1,7 +1,7 @@
 //! How much of an arm readings can tell: base and target alone, then joint zeros, then lengths, then the whole geometry, each judged by
 //! readings that it was not fitted to.
 //!
-//! A rung is taken where it predicts better than the best below it by more than the standard error of that.
+//! A rung is taken where it predicts better than the best below it by more than two standard errors of that.
 //!
 //! Every rung has priors of the size that the readings choose ([`super::prior`]). What decides is the error on readings that are left out,
 //! fold by fold of different configurations: a rung that only fits noise is worse there than the one below.
@@ -18,6 +18,8 @@ use crate::solver::robust;
 
 /// Folds of configurations.
 const FOLDS: usize = 10;
+/// Standard errors by which a rung must predict better: a nominal arm seldom does by luck.
+const BEYOND_CHANCE: f64 = 2.0;
 /// Sizes from which the readings' choice begins: zeros of several degrees are found, lengths and turns are those of manufacturing.
 const LOOSE: Sizes = Sizes { zeros: 10.0, lengths: 1.0, turns: 1.0 };
 
@@ -121,7 +123,7 @@ pub fn climb(arm: &Arm, readings: Readings<'_>, only: Option<Freedom>) -> Result
     Ok(Climbed { geometry: taken.refit(arm, readings, taken.sizes())?, rungs })
 }
 
-/// The rung up to which each is better than the best below it, by more than the standard error of the difference, row by row.
+/// The rung up to which each is better than the best below it, by more than chance has it from row to row.
 fn highest(rungs: &[&[f64]]) -> usize {
     let mut best = 0;
     for (at, squares) in rungs.iter().enumerate().skip(1) {
@@ -129,7 +131,7 @@ fn highest(rungs: &[&[f64]]) -> usize {
         let count = gains.len().max(1) as f64;
         let mean = gains.iter().sum::<f64>() / count;
         let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-        if mean > libm::sqrt(variance / count) {
+        if mean > BEYOND_CHANCE * libm::sqrt(variance / count) {
             best = at;
         }
     }
