@@ -21,6 +21,8 @@ mod figures;
 mod guide;
 #[path = "integration/harness.rs"]
 mod harness;
+#[path = "integration/import.rs"]
+mod import;
 #[path = "integration/killed.rs"]
 mod killed;
 #[path = "integration/kinematics.rs"]

@@ -61,7 +61,8 @@ pub(crate) enum Command {
     #[command(after_help = "Example:\n  kincal design scenes/arm8.toml --set design.method=random")]
     Design(SceneOptions),
     /// Measure configurations on the simulated arm
-    #[command(after_help = "Example:\n  kincal measure scenes/arm8.toml --design recordings/arm8-design.mcap")]
+    #[command(after_help = "Example:\n  kincal measure scenes/arm8.toml --design recordings/arm8-design.mcap\n  \
+        kincal measure scenes/arm8.toml --design poses-joints.csv")]
     Measure(MeasureOptions),
     /// Identify the geometry from a recording or a table of measurements
     #[command(after_help = "Examples:\n  kincal identify recordings/arm8-measure.mcap\n  \
@@ -296,13 +297,13 @@ pub(crate) struct EffectsOptions {
 pub(crate) struct MeasureOptions {
     #[command(flatten)]
     pub(crate) scene: SceneOptions,
-    /// Recording that holds a design, from `kincal design`
+    /// What to measure: the recording of `kincal design`, or a table of joint angles (.csv), such as `kincal correct` writes
     #[arg(long, value_name = "FILE")]
     pub(crate) design: PathBuf,
 }
 
 /// How a table is laid out.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub(crate) struct LayoutOptions {
     /// How three angles of a table make an orientation: rpy (URDF, ROS), abc (KUKA), wpr (FANUC), rotvec (Universal Robots), or the order of
     /// the turns, such as xyz about fixed axes or ZYX about moving ones

@@ -15,7 +15,7 @@ use crate::report;
 pub(crate) fn command(global: &Global, options: &CorrectOptions) -> anyhow::Result<Outcome> {
     let imported = urdf::read(&options.robot, options.base_link.as_deref(), options.tip_link.as_deref())?;
     let arm = imported.arm;
-    let hints = table::Hints { poses_only: true, ..super::input::hints(&arm, &options.layout)? };
+    let hints = table::Hints { needs: table::Needs::Pose, ..super::input::hints(&arm, &options.layout)? };
     let table = table::read_as(&options.targets, &hints)?;
     table.notes.iter().for_each(|note| output::note(global, &format!("note: {note}")));
     let count = arm.joint_count();

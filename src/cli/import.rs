@@ -36,9 +36,8 @@ pub(crate) fn command(global: &Global, options: &ImportOptions) -> anyhow::Resul
     let names: Vec<String> = arm.chain.joints.iter().map(|joint| joint.name.clone()).collect();
     let picked = bag.pick(&options.bag, &names, options.joints.as_deref(), options.poses.as_deref())?;
     let found = picked.streams.latency(|joints, positions| left(&arm, joints, positions));
-    let late = found.filter(|of| {
-        of.seconds.abs() > STANDARD_ERRORS * of.standard_error && of.left_m[1] < WORTH_IT * of.left_m[0]
-    });
+    let late =
+        found.filter(|of| of.seconds.abs() > STANDARD_ERRORS * of.standard_error && of.left_m[1] < WORTH_IT * of.left_m[0]);
     let latency_s = options.latency.unwrap_or_else(|| late.map_or(0.0, |of| of.seconds));
     let rows = picked.streams.rows(latency_s, options.moving);
     ensure!(
@@ -59,7 +58,11 @@ pub(crate) fn command(global: &Global, options: &ImportOptions) -> anyhow::Resul
             format!(
                 "{}, {}; {} poses are in none",
                 rows.measurements.len(),
-                if rows.still { "one for each time that the arm stood still" } else { "one for each pose; the arm may have moved" },
+                if rows.still {
+                    "one for each time that the arm stood still"
+                } else {
+                    "one for each pose; the arm may have moved"
+                },
                 rows.unused
             ),
         ],
@@ -99,7 +102,9 @@ fn clocks(said: Option<f64>, found: Option<Latency>, late: Option<Latency>) -> S
         (Some(said), None, _) => format!("poses {:.1} ms late, as --latency says", said * 1e3),
         (Some(said), Some(found), _) => format!("poses {:.1} ms late, as --latency says; they look {}", said * 1e3, of(found)),
         (None, _, Some(late)) => format!("poses are {}; taken out", of(late)),
-        (None, Some(found), None) => format!("agree: poses are {:.1} ms late (standard error {:.1} ms)", found.seconds * 1e3, found.standard_error * 1e3),
+        (None, Some(found), None) => {
+            format!("agree: poses are {:.1} ms late (standard error {:.1} ms)", found.seconds * 1e3, found.standard_error * 1e3)
+        }
         (None, None, None) => "not compared: too little was read while the arm moved".to_owned(),
     }
 }

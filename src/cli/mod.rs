@@ -82,7 +82,8 @@ fn dispatch(arguments: &Arguments) -> anyhow::Result<Outcome> {
         | Command::Diagnose(_)
         | Command::Identify(_)
         | Command::Import(_)
-        | Command::Replay(_) | Command::Export(_),
+        | Command::Replay(_)
+        | Command::Export(_),
     ) = (global.seed, &arguments.command)
     {
         ensure!(

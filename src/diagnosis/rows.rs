@@ -263,9 +263,15 @@ impl First {
     ///
     /// # Errors
     /// As [`first_fit`].
-    pub(crate) fn calibrated(&self, arm: &Arm, sensor: &Sensor, measurements: &[&Measurement]) -> Result<DVector<f64>, DiagnosisError> {
+    pub(crate) fn calibrated(
+        &self,
+        arm: &Arm,
+        sensor: &Sensor,
+        measurements: &[&Measurement],
+    ) -> Result<DVector<f64>, DiagnosisError> {
         let weights = vec![1.0; measurements.len()];
-        let readings = geometry::Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[], zeros: &[] };
+        let readings =
+            geometry::Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[], zeros: &[] };
         Ok(geometry::shrunk_residual(arm, readings, &self.loose)?)
     }
 }

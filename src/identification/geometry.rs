@@ -203,7 +203,8 @@ impl Geometry {
 
     /// Equations of readings that are not far off.
     fn equations_that_count(&self) -> usize {
-        let off: usize = (0..self.far.len()).filter(|row| self.far[*row] < robust::FAR).map(|row| self.equations.of(row).len()).sum();
+        let off: usize =
+            (0..self.far.len()).filter(|row| self.far[*row] < robust::FAR).map(|row| self.equations.of(row).len()).sum();
         self.residual.len() - off
     }
 

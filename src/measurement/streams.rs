@@ -196,8 +196,11 @@ impl Streams {
                 time_s - last <= 4.0 * GAP && before.iter().zip(&joints).all(|(a, b)| (a - b).abs() <= STILL)
             };
             match stood.last_mut() {
-                Some(own) if own.first().is_some_and(|(_, before, _)| before.iter().zip(&joints).all(|(a, b)| (a - b).abs() <= STILL))
-                    && own.last().is_some_and(same) =>
+                Some(own)
+                    if own
+                        .first()
+                        .is_some_and(|(_, before, _)| before.iter().zip(&joints).all(|(a, b)| (a - b).abs() <= STILL))
+                        && own.last().is_some_and(same) =>
                 {
                     own.push((time_s, joints, pose));
                 }
@@ -205,7 +208,8 @@ impl Streams {
             }
         }
         let still = !moving && stood.len() >= ENOUGH;
-        let groups: Vec<Vec<(f64, Vec<f64>, &PoseSample)>> = if still { stood } else { all.into_iter().map(|one| vec![one]).collect() };
+        let groups: Vec<Vec<(f64, Vec<f64>, &PoseSample)>> =
+            if still { stood } else { all.into_iter().map(|one| vec![one]).collect() };
         let used: usize = groups.iter().map(Vec::len).sum();
         let begin = groups.first().and_then(|group| group.first()).map_or(0.0, |(time, ..)| *time);
         let measurements = groups.iter().enumerate().map(|(index, group)| mean(index, group, begin)).collect();

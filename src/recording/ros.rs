@@ -223,8 +223,7 @@ fn read_file(path: &Path, bag: &mut Bag) -> Result<(), BagError> {
         return Err(BagError::NoBag { path: path.to_owned(), what });
     }
     let mut file = head.as_slice().chain(file);
-    let mut reader =
-        LinearReader::new_with_options(LinearReaderOptions::default().with_record_length_limit(RECORD_LIMIT));
+    let mut reader = LinearReader::new_with_options(LinearReaderOptions::default().with_record_length_limit(RECORD_LIMIT));
     let (mut schemas, mut channels) = (BTreeMap::new(), BTreeMap::new());
     let mut number = 0;
     while let Some(event) = reader.next_event() {
@@ -350,13 +349,7 @@ impl Bag {
     ///
     /// # Errors
     /// If there are none, or it is not clear which are meant.
-    pub fn pick(
-        &self,
-        path: &Path,
-        names: &[String],
-        joints: Option<&str>,
-        poses: Option<&str>,
-    ) -> Result<Picked, BagError> {
+    pub fn pick(&self, path: &Path, names: &[String], joints: Option<&str>, poses: Option<&str>) -> Result<Picked, BagError> {
         let choice = |what: String| BagError::Choice { path: path.to_owned(), what };
         let whole = |samples: &Vec<NamedJoints>| -> Vec<JointSample> {
             let of = |sample: &NamedJoints| {
@@ -373,12 +366,16 @@ impl Bag {
             None => usable.keys().find(|topic| topic.as_str() == "/joint_states").or(usable.keys().next()).copied(),
         };
         let Some(joint_topic) = topic else {
-            let mut there: Vec<String> = self.joints.iter().map(|(topic, samples)| {
-                let mut known: Vec<&str> = samples.iter().flat_map(|of| &of.names).map(String::as_str).collect();
-                known.sort_unstable();
-                known.dedup();
-                format!("{topic} ({})", listed(&known))
-            }).collect();
+            let mut there: Vec<String> = self
+                .joints
+                .iter()
+                .map(|(topic, samples)| {
+                    let mut known: Vec<&str> = samples.iter().flat_map(|of| &of.names).map(String::as_str).collect();
+                    known.sort_unstable();
+                    known.dedup();
+                    format!("{topic} ({})", listed(&known))
+                })
+                .collect();
             if there.is_empty() {
                 there.push("none".to_owned());
             }
@@ -401,9 +398,11 @@ impl Bag {
                 known.iter().map(|name| format!("{name} ({} poses)", self.poses[name.as_str()].len())).collect();
             let there: Vec<&str> = there.iter().map(String::as_str).collect();
             return Err(choice(match (poses, known.is_empty()) {
-                (_, true) => "there are no poses: PoseStamped, PoseWithCovarianceStamped, PointStamped, TransformStamped, Odometry or \
+                (_, true) => {
+                    "there are no poses: PoseStamped, PoseWithCovarianceStamped, PointStamped, TransformStamped, Odometry or \
                               TFMessage are read"
-                    .to_owned(),
+                        .to_owned()
+                }
                 (Some(said), _) => format!("there are no poses on `{said}`; --poses takes one of: {}", listed(&there)),
                 (None, _) => format!("which poses are the target's? --poses takes one of: {}", listed(&there)),
             }));

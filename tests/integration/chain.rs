@@ -176,3 +176,44 @@ fn a_design_comes_out_as_a_table_and_a_calibrated_arm_under_a_name_of_its_own() 
     kincal(run.folder.path(), &["export", &run.text("arm8.mcap"), "--to", "urdf"]).ends(0);
     assert!(fs::read(run.path("arm8.urdf")).unwrap() == nominal);
 }
+
+/// Joints that are corrected with the calibrated model bring the simulated arm to where it was wanted; those of the nominal model do not.
+#[test]
+fn corrected_joints_bring_the_arm_to_the_wanted_poses() {
+    let run = quick_run("scenes/arm8.toml");
+    let out = run.folder.path();
+    let text = |path: &Path| fs::read_to_string(path).unwrap();
+    let table = |recording: &Path| -> Vec<Vec<String>> {
+        kincal(out, &["export", recording.to_str().unwrap(), "--to", "csv"]).ends(0);
+        let path = out.join(format!("{}.csv", recording.file_stem().unwrap().to_str().unwrap()));
+        text(&path).lines().map(|line| line.split(',').map(str::to_owned).collect()).collect()
+    };
+    let of = |header: &[String], row: &[String]| -> [f64; 3] {
+        ["x_m", "y_m", "z_m"].map(|name| row[header.iter().position(|own| own == name).unwrap()].parse().unwrap())
+    };
+    // Wanted is what the arm can reach: poses that it was measured at, within 5 mm.
+    let read = table(Path::new(run.json["recording"].as_str().unwrap()));
+    let kept: Vec<usize> = (0..read[0].len())
+        .filter(|at| ["pose_id", "x_m", "y_m", "z_m"].contains(&read[0][*at].as_str()) || read[0][*at].starts_with("q"))
+        .collect();
+    let rows: Vec<String> =
+        read[..21].iter().map(|row| kept.iter().map(|at| row[*at].as_str()).collect::<Vec<_>>().join(",")).collect();
+    fs::write(out.join("wanted.csv"), rows.join("\n")).unwrap();
+    let away = |urdf: &str| -> f64 {
+        let wanted = out.join("wanted.csv");
+        let robot = run.json[urdf].as_str().unwrap();
+        kincal(out, &["correct", "--robot", robot, "--targets", wanted.to_str().unwrap()]).ends(0);
+        let joints = out.join("wanted-joints.csv");
+        let measured =
+            kincal(out, &["measure", "scenes/arm8.toml", "--design", joints.to_str().unwrap(), "--json"]).ends(0).json();
+        let found = table(Path::new(measured["recording"].as_str().unwrap()));
+        let square = |row: usize| -> f64 {
+            let (wanted, found) = (of(&read[0], &read[row]), of(&found[0], &found[row]));
+            (0..3).map(|axis| (wanted[axis] - found[axis]).powi(2)).sum()
+        };
+        ((1..21).map(square).sum::<f64>() / 20.0).sqrt()
+    };
+    let (nominal, calibrated) = (away("urdf"), away("calibrated_urdf"));
+    println!("corrected with the nominal arm {:.4} mm RMS, with the calibrated one {:.4} mm", nominal * 1e3, calibrated * 1e3);
+    assert!(calibrated < 0.1 * nominal, "{nominal} {calibrated}");
+}

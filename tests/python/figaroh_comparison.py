@@ -5,7 +5,9 @@
 UR5 and laser tracker: fitted to the grid, judged by the 20 random poses (`ur5_tracker` of the data folder). FIGAROH estimates base, tool and
 joint placements ("full_params") by its structural selection; both programs see positions alone.
 """
+import contextlib
 import csv
+import io
 import json
 import logging
 import math
@@ -107,7 +109,8 @@ def main(program):
         for method in METHODS:
             setting = "" if method == "structural" else f', estimation: {{method: "{method}"}}'
             try:
-                took, held_out, fitted, deviations = figaroh(data, folder, setting)
+                with contextlib.redirect_stdout(io.StringIO()):
+                    took, held_out, fitted, deviations = figaroh(data, folder, setting)
             except Exception as error:
                 print(f"FIGAROH, {method:14} failed: {type(error).__name__}: {error}")
                 continue

@@ -13,7 +13,7 @@ import sys
 import tempfile
 
 import numpy
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from calibration_studies import ROBOT, Arm, product, quaternion, wrong
@@ -52,7 +52,9 @@ def write(folder, late_s, stands, joint_hz=100):
     begin, rows = 1_700_000_000.0, {}
     events = [(tick / joint_hz, "joints") for tick in range(int(2 * stands * joint_hz))]
     events += [(tick / 30, "pose") for tick in range(int(2 * stands * 30)) if tick / 30 > late_s]
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+    bag = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
+    bag.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    with bag as writer:
         of_joints = writer.add_connection("/joint_states", joint_state.__msgtype__, typestore=STORE)
         of_poses = writer.add_connection("/tracker/pose", pose_stamped.__msgtype__, typestore=STORE)
         nothing = numpy.zeros(0)

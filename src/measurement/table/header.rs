@@ -1,6 +1,6 @@
 //! The header of a table: what each column is about, and in which unit, under the names that people give them.
 
-use super::Hints;
+use super::{Hints, Needs};
 use crate::units::{ANGLES, LENGTHS, unit_named};
 
 /// What a column is about.
@@ -285,10 +285,10 @@ impl Header {
         if from_zero {
             notes.push("joint columns are numbered from 0: the first joint is number 0 in the table, and 1 here".to_owned());
         }
-        Header::laid_out(columns, notes, hints.poses_only)
+        Header::laid_out(columns, notes, hints.needs)
     }
 
-    fn laid_out(columns: Vec<Column>, notes: Vec<String>, poses_only: bool) -> Result<Header, String> {
+    fn laid_out(columns: Vec<Column>, notes: Vec<String>, needs: Needs) -> Result<Header, String> {
         let joints = numbered(&columns, |column| match column {
             Column::Joint { joint, .. } | Column::Ticks { joint } => Some(*joint),
             _ => None,
@@ -296,14 +296,14 @@ impl Header {
         .map_err(|missing| {
             format!("joint columns must be q1, q2, … without a gap, each once: q{} is missing or doubled", missing + 1)
         })?;
-        if joints == 0 && !poses_only {
+        if joints == 0 && needs != Needs::Pose {
             return Err("no joint columns; q1_rad, q2_rad, … (or _deg, _m, _mm) are needed".to_owned());
         }
         let columns_of =
             |axis: usize| columns.iter().filter(|of| matches!(of, Column::Position { axis: its, .. } if *its == axis)).count();
         let of_axes = [0, 1, 2].map(columns_of);
         let is_fixed = columns.iter().any(|column| matches!(column, Column::FixedPoint));
-        if (of_axes == [0; 3] && !is_fixed) || of_axes.iter().any(|count| *count > 1) {
+        if (of_axes == [0; 3] && !is_fixed && needs != Needs::Joints) || of_axes.iter().any(|count| *count > 1) {
             return Err("the measured position needs x_m, y_m, z_m (or _mm), those that were read, each once; or fixed_point, a label of the \
                         unknown place at which the target was"
                 .to_owned());

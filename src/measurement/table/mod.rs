@@ -173,8 +173,20 @@ pub struct Hints {
     pub ticks_per_turn: Option<f64>,
     /// Columns that are not to be read.
     pub ignored: Vec<String>,
-    /// Whether it is a table of poses, which needs no joints.
-    pub poses_only: bool,
+    /// What every row must have.
+    pub needs: Needs,
+}
+
+/// What every row of a table must have.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Needs {
+    /// Joints and what was read of the target.
+    #[default]
+    Both,
+    /// A pose: it is to be reached.
+    Pose,
+    /// Joints: they are to be measured.
+    Joints,
 }
 
 /// How three numbers make an orientation.
@@ -457,7 +469,7 @@ pub fn parse_as(text: &str, file: &str, hints: &Hints) -> Result<Table, TableErr
             }
             row.unread = [false; 3];
         }
-        if row.unread == [true; 3] {
+        if row.unread == [true; 3] && hints.needs != Needs::Joints {
             empty.push((line, "x, y, z".to_owned()));
             continue;
         }
