@@ -13,6 +13,7 @@ use crate::arm::{Arm, Quantity};
 use crate::measurement::equations::Equations;
 use crate::measurement::{Measurement, Role, Sensor, Weights};
 use crate::numerics;
+use crate::numerics::distribution::student_quantile;
 use crate::quality::subspace::{Subspace, late};
 use crate::seed::stream;
 use crate::solver::{Problem, robust, solve};
@@ -28,6 +29,9 @@ const LEAST_SIZE: f64 = 1e-6;
 const FAR_FROM_NOISE: f64 = 0.25;
 /// Mean square of what is left, in declared sigmas, up to which it is noise.
 const IS_NOISE: f64 = 1.5;
+/// Beyond what is rare lies one in a thousand; of normal noise beyond this many standard deviations.
+const RARE: f64 = 1e-3;
+const NORMAL_RARE: f64 = 3.290_526_7;
 /// Rounds of fitting without the readings that are far off, and of looking which these are.
 const ROUNDS_OF_FAR: usize = 5;
 /// Readings that are far off of which the number is said, at most.
@@ -84,9 +88,12 @@ fn identify_with(
         if now == far {
             break;
         }
-        far = now;
-        good = near(&far);
-        climbed = climb_with(robot, sensor, &good, wishes)?;
+        let rest = near(&now);
+        // Where the rest does not tell an arm, all readings have to.
+        let Ok(next) = climb_with(robot, sensor, &rest, wishes) else {
+            break;
+        };
+        (far, good, climbed) = (now, rest, next);
     }
     if far.is_empty() {
         return tell(robot, sensor, measurements, wishes, climbed, Vec::new());
@@ -204,7 +211,11 @@ fn far_off(
         let error = |equation: usize| left[equations.component(equation)] / equations.sigmas()[equation].max(1e-9);
         DVector::from_iterator(of.len(), of.map(error))
     };
-    let mut of_fit = geometry.errors_without().unwrap_or_default().into_iter();
+    let (of_fit, freedom) = geometry.errors_without().unwrap_or_default();
+    let mut of_fit = of_fit.into_iter();
+    // Few readings hardly tell the noise, and what is rare beside it: Student's quantile over the normal one.
+    let longer = student_quantile(1.0 - RARE / 2.0, freedom.max(1.0)).unwrap_or(f64::INFINITY) / NORMAL_RARE;
+    let unsure = longer.powi(4);
     let mut kept = good.iter();
     let error = |row: usize| {
         let fitted = !left_out.contains(&row) && kept.next().is_some_and(|row| row.role == Role::Fit);
@@ -220,7 +231,7 @@ fn far_off(
         let weights = robust::weights(&squares, counts);
         let is_noise = declared && robust::level(&squares, counts) < IS_NOISE;
         let limit = |row: usize| if is_noise && all[row].role == Role::Fit { FAR_FROM_NOISE } else { robust::FAR };
-        (0..all.len()).map(|row| counts[row] > 0 && weights[row] < limit(row)).collect()
+        (0..all.len()).map(|row| counts[row] > 0 && weights[row] * unsure < limit(row)).collect()
     };
     let (by_position, by_orientation) = (far_in(&positions, &|_| 0), far_in(&orientations, &|row| positions[row]));
     (0..all.len()).filter(|row| by_position[*row] || by_orientation[*row]).collect()
