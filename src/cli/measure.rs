@@ -14,11 +14,15 @@ use crate::scene::Scene;
 use crate::simulation::cell;
 use crate::{recording, report, session};
 
+/// How names of tables end.
+const TABLES: [&str; 3] = ["csv", "tsv", "txt"];
+
 pub(crate) fn command(global: &Global, options: &MeasureOptions) -> anyhow::Result<Outcome> {
     let file = output::scene(global, &options.scene)?;
     let injected = output::injected(&file, &options.scene.scene)?;
     let scene = &file.scene;
-    let configurations = if input::is_recording(&options.design) {
+    let ending = options.design.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let configurations = if !TABLES.contains(&ending.as_str()) {
         of_recording(options, scene)?
     } else {
         let hints = table::Hints { needs: table::Needs::Joints, ..input::hints(&scene.arm, &LayoutOptions::default())? };

@@ -262,7 +262,7 @@ mod tests {
             let share = share * share * (3.0 - 2.0 * share);
             stands[number].iter().zip(&stands[number + 1]).map(|(a, b)| a + share * (b - a)).collect()
         };
-        for _ in 0..20 {
+        for _ in 0..22 {
             stands.push(vec![draws.uniform(-1.0, 1.0), draws.uniform(-1.0, 1.0)]);
         }
         for tick in 0..4000 {
