@@ -118,7 +118,18 @@ fn identify_with(
     let left_out = far.iter().map(|(row, off)| LeftOut { index: measurements[*row].index, off_m: *off }).collect();
     let mut notes = vec![note];
     notes.extend(exchanged(measurements, &far, &climbed.geometry, sensor));
-    Ok(Identification { left_out, ..tell(robot, sensor, &good, wishes, climbed, notes)? })
+    match tell(robot, sensor, &good, wishes, climbed, notes) {
+        Ok(told) => Ok(Identification { left_out, ..told }),
+        // Where the rest does not tell an arm, all readings have to.
+        Err(wrong) => {
+            let climbed = climb_with(robot, sensor, measurements, wishes)?;
+            let note = format!(
+                "readings look far off from what the others say, but without them too little is left: number {}",
+                list.join(", ")
+            );
+            tell(robot, sensor, measurements, wishes, climbed, vec![note]).map_err(|_| wrong)
+        }
+    }
 }
 
 /// A pose is that of another row where it is nearer to that one's than this share of how far it is off.
