@@ -3,6 +3,7 @@
 
 use crate::design::outcome::{DesignOutcome, SearchStep, SwarmIteration};
 use crate::diagnosis::outcome::Diagnosis;
+use crate::identification::known::Known;
 use crate::identification::ladder::Freedom;
 use crate::identification::outcome::Identification;
 use crate::measurement::Distance;
@@ -86,6 +87,9 @@ pub struct RealCell {
     /// Where each joint's zero is looked for, rad or m; empty for nominal.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub zeros: Vec<f64>,
+    /// What somebody knows of the arm beforehand.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub known: Vec<Known>,
     /// Known distances of fixed points.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub distances: Vec<Distance>,

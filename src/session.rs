@@ -13,6 +13,7 @@ use crate::diagnosis::{self, Options};
 use crate::event::{Event, Listener, RealCell, Start, measurements};
 use crate::identification::alignment::align;
 use crate::identification::geometry::GeometryError;
+use crate::identification::known::Known;
 use crate::identification::ladder::Freedom;
 use crate::identification::outcome::Identification;
 use crate::identification::real::Wishes;
@@ -166,6 +167,8 @@ pub struct RealArm {
     pub only: Option<Freedom>,
     /// Where each joint's zero is looked for, rad or m; empty for nominal.
     pub zeros: Vec<f64>,
+    /// What somebody knows of the arm beforehand.
+    pub known: Vec<Known>,
     /// What was left out of the robot's file.
     pub notes: Vec<String>,
 }
@@ -211,6 +214,7 @@ pub fn real_arm(real: &RealCell, robot: (Arm, Vec<String>), measurements: &[Meas
         noise_assumed: real.noise_assumed,
         only: real.only,
         zeros: real.zeros.clone(),
+        known: real.known.clone(),
         notes,
     })
 }
@@ -224,7 +228,7 @@ pub fn identify_real(
     measurements: &[Measurement],
     listener: &mut dyn Listener,
 ) -> Result<Identification, SessionError> {
-    let wishes = Wishes { only: real.only, zeros: &real.zeros };
+    let wishes = Wishes { only: real.only, zeros: &real.zeros, known: &real.known };
     let mut identification = if real.noise_assumed {
         identification::identify_real_without_noise(&real.robot, &real.sensor, measurements, wishes)?
     } else {

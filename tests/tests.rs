@@ -47,5 +47,7 @@ mod secrecy;
 mod steps;
 #[path = "integration/sweep.rs"]
 mod sweep;
+#[path = "integration/tables.rs"]
+mod tables;
 #[path = "integration/urdf_scene.rs"]
 mod urdf_scene;

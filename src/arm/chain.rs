@@ -42,6 +42,19 @@ pub struct Joint {
     pub lower: f64,
     /// Largest coordinate that may be commanded.
     pub upper: f64,
+    /// Another joint that drives it; absent where it moves on its own.
+    pub mimic: Option<Mimic>,
+}
+
+/// How a joint is driven by another one: its coordinate is `multiplier` times that one's plus `offset`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mimic {
+    /// The other joint's number, from 0.
+    pub joint: usize,
+    /// Of its coordinate.
+    pub multiplier: f64,
+    /// Added to that, rad or m.
+    pub offset: f64,
 }
 
 /// One elementary motion of the chain, in the frame that the steps before it have reached.

@@ -94,6 +94,7 @@ mod tests {
                 kind: if joint == 4 { JointKind::Prismatic } else { JointKind::Revolute },
                 lower: -3.0,
                 upper: 3.0,
+                mimic: None,
             })
             .collect();
         let six = SixParameters { xyz: [0.1, -0.2, 0.3], rpy: [0.4, -0.5, 2.6] };

@@ -10,11 +10,12 @@ pub mod inverse;
 pub mod parameters;
 
 pub mod chain;
+pub mod dh;
 pub mod mdh;
 pub mod model;
 pub mod self_collision;
 pub mod urdf;
 
-pub use chain::{Axis, Chain, ChainAt, Joint, JointKind, Step};
+pub use chain::{Axis, Chain, ChainAt, Joint, JointKind, Mimic, Step};
 pub use model::{Arm, Fixture, Geometry, Inertial, Link, Shape};
 pub use parameters::{Parameter, Quantity};

@@ -295,7 +295,7 @@ mod tests {
     fn arm(shape: Geometry, at: Pose) -> Arm {
         let frames = [0.0, 0.5, 0.5, 0.5].map(|a| MdhFrame { a, ..MdhFrame::default() });
         let joints = (1..=3)
-            .map(|index| Joint { name: format!("j{index}"), kind: JointKind::Revolute, lower: -3.1, upper: 3.1 })
+            .map(|index| Joint { name: format!("j{index}"), kind: JointKind::Revolute, lower: -3.1, upper: 3.1, mimic: None })
             .collect();
         let link = |name: &str, shapes| Link { name: name.to_owned(), inertial: None, shapes };
         let shape = Shape { link_from_shape: at, geometry: shape };

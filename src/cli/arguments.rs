@@ -58,7 +58,9 @@ pub(crate) enum Command {
     #[command(after_help = "Example:\n  kincal run scenes/arm8.toml --set design.count=20 --seed 7 --rerun run.rrd")]
     Run(SceneOptions),
     /// Choose the configurations to measure
-    #[command(after_help = "Example:\n  kincal design scenes/arm8.toml --set design.method=random")]
+    #[command(after_help = "Example:\n  kincal design scenes/arm8.toml --set design.method=random\n\n\
+        Beside the recording, OUT/NAME-design.csv has the configurations in an order in which the moves are short, from the middle of the\n\
+        joints' limits on; collisions on the way are not looked at.")]
     Design(SceneOptions),
     /// Measure configurations on the simulated arm
     #[command(after_help = "Example:\n  kincal measure scenes/arm8.toml --design recordings/arm8-design.mcap\n  \
@@ -89,10 +91,13 @@ pub(crate) enum Command {
         was read), or for each pose where it never did. Where the arm moves, the program finds by how much poses are stamped late.")]
     Import(ImportOptions),
     /// Joint angles at which a calibrated robot reaches wanted poses
-    #[command(after_help = "Example:\n  kincal correct --robot recordings/cell-identified.urdf --targets poses.csv\n\n\
+    #[command(after_help = "Examples:\n  kincal correct --robot recordings/cell-identified.urdf --targets poses.csv\n  \
+        kincal correct --measurements cell.csv --robot ur5.urdf --targets poses.csv     with the effects that a diagnosis names\n\n\
         The table has x_mm, y_mm, z_mm (or _m) of the tip in the root's frame, and qx, qy, qz, qw or three angles (--euler) where orientations\n\
         count; joint columns say where each pose is looked for, else it is the nearest to the one before. A robot that was calibrated with\n\
-        --with-frames takes poses of the target in the measurement frame. Exit code 1: a pose is out of reach.")]
+        --with-frames takes poses of the target in the measurement frame. With --measurements, sides of approach follow from the order of the\n\
+        poses (the first comes from the last one measured), or from approach1 …; payload_kg and temperatures count where effects go with\n\
+        them. Exit code 1: a pose is out of reach.")]
     Correct(CorrectOptions),
     /// Recompute a recording and compare bit for bit
     #[command(after_help = "Examples:\n  kincal replay recordings/arm8.mcap\n  \
@@ -378,20 +383,18 @@ pub(crate) struct ImportOptions {
 
 #[derive(Debug, Args)]
 pub(crate) struct CorrectOptions {
-    /// Calibrated robot (URDF)
-    #[arg(long, value_name = "FILE")]
-    pub(crate) robot: PathBuf,
     /// Wanted poses (.csv)
     #[arg(long, value_name = "FILE")]
     pub(crate) targets: PathBuf,
-    /// Link in whose frame the poses are given [default: the root]
-    #[arg(long, value_name = "LINK")]
-    pub(crate) base_link: Option<String>,
-    /// Link that is to be there [default: the only leaf]
-    #[arg(long, value_name = "LINK")]
-    pub(crate) tip_link: Option<String>,
+    /// Recording or table of measurements: the geometry is that of a diagnosis of it, whose named effects count, and --robot is the nominal
+    /// one
+    #[arg(long, value_name = "FILE")]
+    pub(crate) measurements: Option<PathBuf>,
+    /// Poses are those of the target in the measurement frame, not of the tip in the root's (with --measurements)
+    #[arg(long, requires = "measurements")]
+    pub(crate) in_measurement_frame: bool,
     #[command(flatten)]
-    pub(crate) layout: LayoutOptions,
+    pub(crate) robot: RobotOptions,
 }
 
 #[derive(Debug, Args)]
@@ -453,6 +456,15 @@ pub(crate) struct IdentifyOptions {
     /// What alone is to be let loose of a real arm beside its base and target [default: what predicts readings best that are left out]
     #[arg(long, value_enum)]
     pub(crate) only: Option<Only>,
+    /// What is as the file says: a joint (elbow_joint, or 3), a part of it (3.zero, 3.length, 3.twist), zeros, lengths, twists, base or target
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub(crate) fix: Vec<String>,
+    /// What is free, whatever predicts best: names as for --fix
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub(crate) free: Vec<String>,
+    /// How far something may be off, one sigma: lengths=0.2mm, elbow_joint.zero=0.5deg
+    #[arg(long, value_name = "NAME=SIGMA", value_delimiter = ',')]
+    pub(crate) prior: Vec<String>,
     /// Add the measurement frame and the target to the calibrated URDF, as links with fixed joints
     #[arg(long)]
     pub(crate) with_frames: bool,
@@ -472,8 +484,14 @@ pub(crate) struct ReplayOptions {
 
 #[derive(Debug, Args)]
 pub(crate) struct ExportOptions {
-    /// Scene (.toml) or recording (.mcap)
+    /// Scene (.toml) or recording (.mcap); for --to dh also a URDF
     pub(crate) input: PathBuf,
+    /// Link of the URDF at which the arm begins
+    #[arg(long, value_name = "LINK")]
+    pub(crate) base_link: Option<String>,
+    /// Link of the URDF at which it ends
+    #[arg(long, value_name = "LINK")]
+    pub(crate) tip_link: Option<String>,
     /// Format
     #[arg(long, value_enum)]
     pub(crate) to: Format,
@@ -486,10 +504,12 @@ pub(crate) struct ExportOptions {
 pub(crate) enum Format {
     /// The arm: nominal from a scene, identified from a recording that holds an identification
     Urdf,
-    /// The measurements of a recording
+    /// The measurements of a recording; of a design, its configurations in an order with short moves
     Csv,
     /// The public part of the scene
     Toml,
+    /// The arm as a table of modified Denavit-Hartenberg parameters (CSV; mm, degrees)
+    Dh,
     /// The identified arm as the kinematics file of Universal Robots' driver (YAML)
     UrKinematics,
     /// Base and target of an identified arm as static transforms of ROS 2 (a shell script)

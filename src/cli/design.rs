@@ -18,6 +18,11 @@ pub(crate) fn command(global: &Global, options: &SceneOptions) -> anyhow::Result
     if let Some(recording) = &recording {
         output::show(global, &format!("Recording   {}", recording.display()))?;
     }
-    output::show_json(global, &json!({ "design": outcome, "recording": recording }))?;
+    let arm = &file.scene.arm;
+    let path = global.out.join(format!("{stem}.csv"));
+    output::check_target(&path)?;
+    output::write(&path, &output::to_visit(arm, &outcome.configurations)?)?;
+    output::show(global, &format!("To visit    {}", path.display()))?;
+    output::show_json(global, &json!({ "design": outcome, "recording": recording, "to_visit": path }))?;
     Ok(Outcome::Good)
 }

@@ -1,9 +1,11 @@
 //! `kincal diagnose`: what causes what a calibration leaves.
 
+use std::path::Path;
+
 use anyhow::{Context, bail, ensure};
 
 use super::Outcome;
-use super::arguments::{DiagnoseOptions, Global};
+use super::arguments::{DiagnoseOptions, Global, RobotOptions};
 use super::output::Audience;
 use super::{input, output};
 use crate::arm::Arm;
@@ -27,17 +29,9 @@ pub(crate) fn command(global: &Global, options: &DiagnoseOptions) -> anyhow::Res
         };
         without.push(kind);
     }
-    let subject = subject(global, options)?;
+    let subject = subject(global, &options.input, &options.robot, &options.set, options.partial)?;
     let rows: Vec<&Measurement> = subject.measurements.iter().collect();
-    let settings = settings(&subject.settings, &options.set)?;
-    // A scene says how its arm stands; a URDF does not.
-    let is_urdf = subject.start.real.as_ref().is_some_and(|real| real.urdf.is_some());
-    let gravity = if is_urdf { Gravity::Assumed } else { Gravity::Known };
-    let options_of_diagnosis = Options { without, settings, gravity, ..Options::new(subject.noise) };
-    let conclusion = diagnosis::diagnose(&subject.arm, &subject.sensor, &rows, &options_of_diagnosis)
-        .with_context(|| options.input.display().to_string())?;
-    let mut diagnosis = report::wording::diagnosis(conclusion);
-    diagnosis.notes.extend(subject.notes.iter().cloned());
+    let diagnosis = diagnosed(&subject, &rows, &options.input, without, &options.set)?;
     show(global, options, &subject, &diagnosis)?;
     let confirmation = if options.confirm {
         let arm = as_mounted(&subject, &diagnosis)?;
@@ -63,13 +57,33 @@ pub(crate) fn command(global: &Global, options: &DiagnoseOptions) -> anyhow::Res
     })
 }
 
+/// The diagnosis of `subject`, whose measurements are `rows`, without these kinds.
+pub(super) fn diagnosed(
+    subject: &Subject,
+    rows: &[&Measurement],
+    path: &Path,
+    without: Vec<Kind>,
+    set: &[String],
+) -> anyhow::Result<Diagnosis> {
+    let settings = settings(&subject.settings, set)?;
+    // A scene says how its arm stands; a URDF does not.
+    let is_urdf = subject.start.real.as_ref().is_some_and(|real| real.urdf.is_some());
+    let gravity = if is_urdf { Gravity::Assumed } else { Gravity::Known };
+    let options = Options { without, settings, gravity, ..Options::new(subject.noise) };
+    let conclusion =
+        diagnosis::diagnose(&subject.arm, &subject.sensor, rows, &options).with_context(|| path.display().to_string())?;
+    let mut diagnosis = report::wording::diagnosis(conclusion);
+    diagnosis.notes.extend(subject.notes.iter().cloned());
+    Ok(diagnosis)
+}
+
 /// The arm under gravity as the diagnosis has it.
-fn as_mounted(subject: &Subject, diagnosis: &Diagnosis) -> anyhow::Result<Arm> {
+pub(super) fn as_mounted(subject: &Subject, diagnosis: &Diagnosis) -> anyhow::Result<Arm> {
     let of_rows = |row: &Measurement| row.gravity_m_s2;
     let first = subject.measurements.first().and_then(of_rows);
     ensure!(
         subject.measurements.iter().all(|row| of_rows(row) == first),
-        "--confirm simulates an arm under one gravity, and the rows have several: give the rows of one of them"
+        "an arm under one gravity is needed for what its effects do elsewhere (--confirm, correct), and the rows have several: give the rows of one of them"
     );
     let gravity = diagnosis.gravity_m_s2.or(first);
     let mut arm = subject.arm.clone();
@@ -107,25 +121,32 @@ fn settings(usual: &Settings, changes: &[String]) -> anyhow::Result<Settings> {
 }
 
 /// What is diagnosed.
-struct Subject {
+pub(super) struct Subject {
     /// What a recording of it would begin with.
-    start: Start,
-    arm: Arm,
-    sensor: Sensor,
+    pub(super) start: Start,
+    pub(super) arm: Arm,
+    pub(super) sensor: Sensor,
     noise: NoiseSource,
     settings: Settings,
-    measurements: Vec<Measurement>,
-    notes: Vec<String>,
+    pub(super) measurements: Vec<Measurement>,
+    pub(super) notes: Vec<String>,
 }
 
-fn subject(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Subject> {
-    if input::is_recording(&options.input) {
-        input::no_robot(&options.robot)?;
-        let (recorded, measurements) = input::recorded(global, &options.input, options.partial)?;
+/// Reads `path`, a recording or a table of the robot of `robot`; `set`: changes of settings.
+pub(super) fn subject(
+    global: &Global,
+    path: &Path,
+    robot: &RobotOptions,
+    set: &[String],
+    partial: bool,
+) -> anyhow::Result<Subject> {
+    if input::is_recording(path) {
+        input::no_robot(robot)?;
+        let (recorded, measurements) = input::recorded(global, path, partial)?;
         let start = Start { real: recorded.real, ..session::start_event("diagnose", &recorded.scene) };
         return match &start.real {
             Some(real) => {
-                let (arm, notes) = session::real_robot(&start, real).with_context(|| options.input.display().to_string())?;
+                let (arm, notes) = session::real_robot(&start, real).with_context(|| path.display().to_string())?;
                 let sensor = session::real_sensor(real, &measurements);
                 Ok(Subject {
                     start,
@@ -138,7 +159,7 @@ fn subject(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Subject
                 })
             }
             None => {
-                let scene = scene::parse(&start.scene, &format!("{} (scene)", options.input.display()))?.scene;
+                let scene = scene::parse(&start.scene, &format!("{} (scene)", path.display()))?.scene;
                 let noise = NoiseSource::Declared;
                 Ok(Subject {
                     start,
@@ -153,12 +174,12 @@ fn subject(global: &Global, options: &DiagnoseOptions) -> anyhow::Result<Subject
         };
     }
     let input::Front { start, real, arm, mut table, mut notes } =
-        input::front("diagnose", &options.input, &options.robot, &settings(&Settings::default(), &options.set)?.model)?;
+        input::front("diagnose", path, robot, &settings(&Settings::default(), set)?.model)?;
     // An effect is looked for about joints as they stand.
     for row in &mut table.measurements {
         row.joints.iter_mut().zip(&real.zeros).for_each(|(value, zero)| *value += zero);
     }
-    let noise = if options.robot.position_noise_um.is_some() { NoiseSource::Declared } else { NoiseSource::Assumed };
+    let noise = if robot.position_noise_um.is_some() { NoiseSource::Declared } else { NoiseSource::Assumed };
     let sensor = session::real_sensor(&real, &table.measurements);
     if table.fill_in_approach() {
         notes.push(

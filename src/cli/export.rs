@@ -1,13 +1,13 @@
 //! `kincal export`: a robot or measurements in another format.
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use serde_json::json;
 
 use super::Outcome;
 use super::arguments::{ExportOptions, Format, Global};
 use super::input::{input_stem, is_recording};
 use super::output;
-use crate::arm::{Arm, urdf};
+use crate::arm::{Arm, JointKind, dh, urdf};
 use crate::event::{self, Event};
 use crate::measurement::{Measurement, Sensor, table};
 use crate::{recording, scene, session};
@@ -29,12 +29,18 @@ pub(crate) fn command(global: &Global, options: &ExportOptions) -> anyhow::Resul
 fn from_scene(options: &ExportOptions) -> anyhow::Result<(&'static str, String)> {
     let path = &options.input;
     if path.extension().is_some_and(|extension| extension == "urdf" || extension == "csv") {
-        bail!("{}: give a scene (.toml) or a recording (.mcap)", path.display());
+        if options.to == Format::Dh && path.extension().is_some_and(|extension| extension == "urdf") {
+            let arm = urdf::read(path, options.base_link.as_deref(), options.tip_link.as_deref())?.arm;
+            return Ok(("dh.csv", dh_table(&arm, &arm.chain.nominal())?));
+        }
+        bail!("{}: give a scene (.toml) or a recording (.mcap); a URDF for --to dh", path.display());
     }
+    no_links(options)?;
     let file = scene::read(path)?;
     match options.to {
         Format::Urdf => Ok(("urdf", urdf::export(&file.scene.arm)?)),
         Format::Toml => Ok(("public.toml", file.public_toml()?)),
+        Format::Dh => Ok(("dh.csv", dh_table(&file.scene.arm, &file.scene.arm.chain.nominal())?)),
         Format::UrKinematics | Format::RosTransforms => {
             bail!("{} is a scene: give the recording of `kincal identify`", path.display())
         }
@@ -42,7 +48,26 @@ fn from_scene(options: &ExportOptions) -> anyhow::Result<(&'static str, String)>
     }
 }
 
+fn no_links(options: &ExportOptions) -> anyhow::Result<()> {
+    let given = options.base_link.is_some() || options.tip_link.is_some();
+    ensure!(
+        !given,
+        "--base-link, --tip-link: they choose a part of a URDF, and {} is none; leave them out",
+        options.input.display()
+    );
+    Ok(())
+}
+
+/// The Denavit-Hartenberg table of `arm` at the parameters `values`.
+fn dh_table(arm: &Arm, values: &[f64]) -> anyhow::Result<String> {
+    let joints = &arm.chain.joints;
+    let kinds: Vec<JointKind> = joints.iter().map(|joint| joint.kind).collect();
+    let names: Vec<&str> = joints.iter().map(|joint| joint.name.as_str()).collect();
+    Ok(dh::table(&arm.chain.at(values), &kinds).csv(&names, &kinds)?)
+}
+
 fn from_recording(global: &Global, options: &ExportOptions) -> anyhow::Result<(&'static str, String)> {
+    no_links(options)?;
     let path = &options.input;
     let recording = recording::read::read(path)?;
     if let Some(cut) = &recording.cut {
@@ -75,7 +100,7 @@ fn from_recording(global: &Global, options: &ExportOptions) -> anyhow::Result<(&
             });
             match designed {
                 Some(outcome) if measured.is_empty() => {
-                    return Ok(("csv", table::write_configurations(&outcome.configurations, &arm()?.slides())?));
+                    return Ok(("csv", output::to_visit(&arm()?, &outcome.configurations)?));
                 }
                 None if measured.is_empty() => bail!("{} holds no measurements, and no design", path.display()),
                 _ => {}
@@ -84,6 +109,21 @@ fn from_recording(global: &Global, options: &ExportOptions) -> anyhow::Result<(&
                 output::note(global, &noise_options(&scene()?.scene.sensor, &measured));
             }
             Ok(("csv", table::write(&measured, &arm()?.slides())?))
+        }
+        Format::Dh => {
+            let identified = recording.events.iter().rev().find_map(|event| match event {
+                Event::Identified(identification) => Some(identification),
+                _ => None,
+            });
+            let arm = arm()?;
+            let values = match identified {
+                Some(of) => of.parameters.iter().map(|parameter| parameter.identified).collect(),
+                None => {
+                    output::note(global, "note: the recording holds no identification; this is the nominal arm");
+                    arm.chain.nominal()
+                }
+            };
+            Ok(("dh.csv", dh_table(&arm, &values)?))
         }
         Format::UrKinematics | Format::RosTransforms => {
             let identified = recording.events.iter().rev().find_map(|event| match event {

@@ -13,6 +13,7 @@ use crate::arm::Arm;
 use crate::diagnosis::rows::check_robot;
 use crate::diagnosis::settings::Model;
 use crate::event::{self, Event, RealCell, Start};
+use crate::identification::known::{Words, known};
 use crate::identification::mistake::Said;
 use crate::measurement::{Measurement, Role, table};
 use crate::progress::Progress as _;
@@ -37,6 +38,8 @@ fn from_recording(global: &Global, options: &IdentifyOptions) -> anyhow::Result<
         }
         return real_cell(global, options, start, &real, nominal, measurements);
     }
+    let of_real_arms = !options.fix.is_empty() || !options.free.is_empty() || !options.prior.is_empty();
+    ensure!(!of_real_arms, "--fix, --free, --prior: they are for tables of real arms, not for those of a scene; leave them out");
     let file = scene::parse(&start.scene, &format!("{} (scene)", options.input.display()))?;
     let scene = &file.scene;
     let measurements = with_evaluation(measurements, options, &scene.arm)?;
@@ -75,7 +78,19 @@ fn real_cell(
     let joint_count = nominal.0.joint_count();
     input::check_joints(&options.input, &measurements, joint_count)?;
     let measurements = with_evaluation(measurements, options, &nominal.0)?;
-    let real = &RealCell { only: options.only.map(Into::into), ..real.clone() };
+    let words = Words { fix: &options.fix, free: &options.free, prior: &options.prior };
+    let known = known(&nominal.0, words).map_err(anyhow::Error::msg)?;
+    let mut nominal = nominal;
+    for (option, names, meaning) in [
+        ("--fix", &options.fix, "held as the file has it"),
+        ("--free", &options.free, "free"),
+        ("--prior", &options.prior, "one sigma beforehand"),
+    ] {
+        if !names.is_empty() {
+            nominal.1.push(format!("{meaning}, as {option} says: {}", names.join(", ")));
+        }
+    }
+    let real = &RealCell { only: options.only.map(Into::into), known, ..real.clone() };
     let start = Start { real: Some(real.clone()), ..start };
     let own = real.urdf.clone();
     let real = session::real_arm(real, nominal, &measurements).with_context(|| options.input.display().to_string())?;

@@ -61,6 +61,7 @@ fn described(command: &str, robot: &Path, options: &RobotOptions) -> anyhow::Res
         orientation_sigma_rad: options.orientation_noise_deg.unwrap_or(ORIENTATION_NOISE_DEG).to_radians(),
         only: None,
         zeros: Vec::new(),
+        known: Vec::new(),
         distances: options.distances.as_ref().map(table::read_distances).transpose()?.unwrap_or_default(),
     };
     Ok((Start { real: Some(real.clone()), ..session::start_event(command, &scene) }, real))
@@ -88,6 +89,7 @@ pub(crate) fn front(command: &str, path: &Path, options: &RobotOptions, model: &
     let (arm, mut notes) = session::real_robot(&start, &real).with_context(|| robot.display().to_string())?;
     let mut table = read_table(path, &arm, options)?;
     notes.extend(table.notes.iter().cloned());
+    notes.extend(without_frozen(&mut table, &arm));
     check_units(path, &table, &arm)?;
     check_joints(path, &table.measurements, arm.joint_count())?;
     for distance in &real.distances {
@@ -126,11 +128,58 @@ pub(crate) fn front(command: &str, path: &Path, options: &RobotOptions, model: &
     Ok(Front { start, real, arm, table, notes })
 }
 
+/// An arm that moved by so much (m; rad) between two readings cannot have left a pose the same to its last digit.
+const SURELY_MOVED: f64 = 1e-3;
+
+/// Takes out readings that repeat the one before to the last digit although the arm has moved: the sensor, or its driver, had stopped. Says
+/// which.
+fn without_frozen(table: &mut table::Table, arm: &Arm) -> Option<String> {
+    let rows = &mut table.measurements;
+    if rows.iter().any(|row| row.joints.len() != arm.joint_count()) {
+        return None;
+    }
+    let nominal = arm.chain.at_nominal();
+    let mut frozen: Vec<usize> = Vec::new();
+    let mut last = 0;
+    for row in 1..rows.len() {
+        let (before, now) = (&rows[last], &rows[row]);
+        let same = now.is_in_frame()
+            && now.position_m == before.position_m
+            && now.unread == before.unread
+            && now.orientation_xyzw == before.orientation_xyzw
+            && (&now.session, &now.target) == (&before.session, &before.target);
+        let (from, to) = (nominal.forward(&before.joints), nominal.forward(&now.joints));
+        let moved = (to.translation.vector - from.translation.vector).norm();
+        let turned = if now.orientation_xyzw.is_some() { to.rotation.angle_to(&from.rotation) } else { 0.0 };
+        if same && moved.max(turned) > SURELY_MOVED {
+            frozen.push(row);
+        } else {
+            last = row;
+        }
+    }
+    if frozen.is_empty() || 2 * frozen.len() > rows.len() {
+        return None;
+    }
+    let numbers: Vec<String> = frozen.iter().take(12).map(|row| (row + 1).to_string()).collect();
+    let more = if frozen.len() > numbers.len() { format!(" and {} more", frozen.len() - numbers.len()) } else { String::new() };
+    let mut number = 0;
+    rows.retain(|_| {
+        number += 1;
+        frozen.binary_search(&(number - 1)).is_err()
+    });
+    rows.iter_mut().enumerate().for_each(|(index, row)| row.index = index);
+    Some(format!(
+        "readings {}{more} repeat the one before to the last digit although the arm had moved: the sensor had stopped; they were left out, \
+         and numbers below count what is left",
+        numbers.join(", ")
+    ))
+}
+
 /// Corrects `table` as `--fix-columns` says; the units that its columns say, and what was corrected.
 pub(crate) fn corrected(table: &mut table::Table, arm: &Arm, options: &RobotOptions) -> anyhow::Result<(Said, Vec<String>)> {
     let slides = arm.slides();
     let turning = table.joint_factor.iter().zip(&slides).find(|(_, slides)| !**slides);
-    let said = Said { angle: turning.map_or(1.0, |(factor, _)| *factor), position: table.position_factor };
+    let said = Said { angle: turning.map_or(1.0, |(factor, _)| *factor), position: table.position_factor, euler: table.euler };
     let mut notes = Vec::new();
     for text in &options.fix_columns {
         let fix: Fix = text.parse().map_err(|wrong| anyhow::anyhow!("--fix-columns {wrong}"))?;
@@ -156,8 +205,8 @@ pub(crate) fn read_table(path: &Path, arm: &Arm, options: &RobotOptions) -> anyh
             "--ticks-per-turn {ticks}: a number of at least 1 is needed, such as 4096"
         );
     }
-    let hints = hints(arm, &options.layout)?;
-    let mut table = table::read_as(path, &table::Hints { ticks_per_turn: options.ticks_per_turn, ..hints })?;
+    let hints = table::Hints { ticks_per_turn: options.ticks_per_turn, ..hints(arm, &options.layout)? };
+    let mut table = with_driven(path, arm, &hints)?;
     if !options.gravity.is_empty() {
         let said = options.gravity.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
         let Ok(gravity) = <[f64; 3]>::try_from(options.gravity.as_slice()) else {
@@ -165,6 +214,57 @@ pub(crate) fn read_table(path: &Path, arm: &Arm, options: &RobotOptions) -> anyh
         };
         table.set_gravity(gravity).map_err(|what| anyhow::anyhow!("--gravity {said}: {what}"))?;
     }
+    Ok(table)
+}
+
+/// The table at `path`, in which joints that are driven by others may be missing: their coordinates follow from those.
+fn with_driven(path: &Path, arm: &Arm, hints: &table::Hints) -> anyhow::Result<table::Table> {
+    let all = table::read_as(path, hints);
+    let joints = &arm.chain.joints;
+    let own: Vec<usize> = (0..joints.len()).filter(|joint| joints[*joint].mimic.is_none()).collect();
+    if own.len() == joints.len() || all.as_ref().is_ok_and(|table| table.joint_factor.len() == joints.len()) {
+        return Ok(all?);
+    }
+    let of_own = own.iter().map(|joint| hints.joints[*joint].clone()).collect();
+    let Ok(mut table) = table::read_as(path, &table::Hints { joints: of_own, ..hints.clone() }) else {
+        return Ok(all?);
+    };
+    if table.joint_factor.len() != own.len() {
+        return Ok(all?);
+    }
+    // Of each joint, the column that says where it is, and how: driven ones may be driven by driven ones.
+    let source = |joint: usize| -> Option<(usize, f64, f64)> {
+        let (mut at, mut multiplier, mut offset) = (joint, 1.0, 0.0);
+        for _ in 0..joints.len() {
+            match &joints[at].mimic {
+                None => return Some((own.binary_search(&at).ok()?, multiplier, offset)),
+                Some(mimic) => {
+                    offset += multiplier * mimic.offset;
+                    multiplier *= mimic.multiplier;
+                    at = mimic.joint;
+                }
+            }
+        }
+        None
+    };
+    let Some(sources) = (0..joints.len()).map(source).collect::<Option<Vec<_>>>() else {
+        bail!("joints of the robot drive one another in a circle: correct the <mimic> elements");
+    };
+    for row in &mut table.measurements {
+        let read = row.joints.clone();
+        row.joints = sources.iter().map(|(column, multiplier, offset)| multiplier * read[*column] + offset).collect();
+        if row.approach.len() == own.len() {
+            let sides = row.approach.clone();
+            row.approach = sources
+                .iter()
+                .map(|(column, multiplier, _)| if *multiplier < 0.0 { -sides[*column] } else { sides[*column] })
+                .collect();
+        }
+    }
+    table.joint_factor = sources.iter().map(|(column, ..)| table.joint_factor[*column]).collect();
+    table.joint_is_length = joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect();
+    let driven: Vec<&str> = joints.iter().filter(|joint| joint.mimic.is_some()).map(|joint| joint.name.as_str()).collect();
+    table.notes.push(format!("{} of the robot have no columns: they follow the joints that drive them", driven.join(", ")));
     Ok(table)
 }
 

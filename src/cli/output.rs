@@ -10,8 +10,10 @@ use super::arguments::{Global, SceneOptions};
 use super::bar::Bar;
 use crate::arm::{Arm, urdf};
 use crate::design::problem::DesignProblem;
+use crate::design::route::route;
 use crate::event::Event;
 use crate::identification::outcome::Identification;
+use crate::measurement::table;
 use crate::progress::{Progress, Stopped};
 use crate::recording::truth_file::write_whole;
 use crate::recording::write::Recorder;
@@ -279,4 +281,12 @@ impl Progress<&Event> for Audience {
         }
         Ok(())
     }
+}
+
+/// A table of `configurations` of `arm` in an order in which the moves are short, from the middle of the joints' limits on.
+pub(crate) fn to_visit(arm: &Arm, configurations: &[Vec<f64>]) -> anyhow::Result<String> {
+    let joints = &arm.chain.joints;
+    let middle: Vec<f64> = joints.iter().map(|joint| 0.5 * (joint.lower + joint.upper)).collect();
+    let travel: Vec<f64> = joints.iter().map(|joint| joint.upper - joint.lower).collect();
+    Ok(table::write_configurations(configurations, &route(configurations, &middle, &travel), &arm.slides())?)
 }

@@ -17,6 +17,7 @@ pub mod outcome;
 pub mod perturbation;
 mod pool;
 pub mod problem;
+pub mod route;
 pub mod search;
 pub mod swarm;
 #[cfg(test)]

@@ -108,7 +108,7 @@ pub(crate) fn repeats(measurements: &[&Measurement], groups: &Groups, settings: 
     }
     // Coordinates that every reading has.
     // A ball that is put into its socket again tells nothing of the sensor.
-    let read = [0, 1, 2].map(|axis| measurements.iter().all(|row| !row.unread[axis] && row.fixed_point.is_none()));
+    let read = [0, 1, 2].map(|axis| measurements.iter().all(|row| !row.unread[axis] && row.is_in_frame()));
     let axes = read.iter().filter(|read| **read).count();
     let equal = |a: &Measurement, b: &Measurement| {
         let near = |a: Option<f64>, b: Option<f64>| match (a, b) {

@@ -116,7 +116,7 @@ pub(crate) fn schemes(
     let points: Vec<Vector3<f64>> = groups.rows.iter().map(|rows| targets[rows[0]]).collect();
     let most = folds.min(points.len() / settings.configurations).max(2);
     // Where a fixed point is, only its own readings tell: a fold has some of each.
-    let sockets = measurements.iter().any(|row| row.fixed_point.is_some());
+    let sockets = measurements.iter().any(|row| !row.is_in_frame());
     let of_group = if sockets { (0..points.len()).map(|group| group % most).collect() } else { regions(&points, most) };
     let by_region = groups.of.iter().map(|group| of_group[*group]).collect();
     let mut schemes = vec![Scheme::new(Block::Region, by_region, &[], folds)];

@@ -12,6 +12,7 @@ mod claims;
 pub mod conclusion;
 pub(crate) mod conditions;
 mod confusion;
+pub mod correction;
 pub(crate) mod deflection;
 mod detectability;
 mod evidence;

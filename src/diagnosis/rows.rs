@@ -7,7 +7,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::scatter::Scatter;
 use super::settings::Model;
-use crate::arm::Arm;
+use crate::arm::frames::Pose;
+use crate::arm::{Arm, ChainAt};
 use crate::effects::signature::posture::{Mechanism, Posture};
 use crate::effects::signature::shape::Displacement;
 use crate::identification::geometry::{self, GeometryError};
@@ -106,9 +107,24 @@ pub(crate) struct Rows {
     pub(crate) notes: Vec<String>,
     /// Axes of the root in measurement of each row.
     turn: Vec<Matrix3<f64>>,
+    /// From the measurement frame to the target, of the first session and target.
+    pub(crate) measurement_to_target: ChainAt,
+    /// Where the root stands, session by session.
+    pub(crate) measurement_from_root: Vec<Pose>,
+    /// Where each target sits on the tool.
+    pub(crate) tool_from_target: Vec<Pose>,
 }
 
 impl Rows {
+    /// Adds the arm at the joints of `row`, of the first session and target; nothing was read of it.
+    pub(crate) fn push(&mut self, row: &Measurement) {
+        let gravity = row.gravity(&self.mechanism.gravity);
+        let posture = self.mechanism.posture_moved(&row.joints, row.payload_kg.unwrap_or(0.0), &gravity, &[]);
+        self.targets.push(posture.tool + posture.tool_axes * self.tool_from_target[0].translation.vector);
+        self.postures.push(posture);
+        self.turn.push(self.measurement_from_root[0].rotation.to_rotation_matrix().into_inner());
+    }
+
     /// What the equations of `row` say of a displacement of its target (m, rad, in root).
     pub(crate) fn read(&self, row: usize, displacement: &Displacement) -> impl Iterator<Item = f64> {
         let [x, y, z, rx, ry, rz] = *displacement;
@@ -186,9 +202,9 @@ pub fn check_robot(
         Some(first_fit(arm, sensor, &rows.iter().collect::<Vec<_>>(), settings, said).ok()?.rms_m)
     };
     if mistake::is_suspicious(arm, measurements) {
-        let (hint, explanations) = mistake::hint(arm, said, measurements);
+        let mistake::Hint { text: hint, explanations, another_robot } = mistake::hint(arm, said, measurements);
         let best = explanations.iter().filter_map(|found| corrected(&found.fixes)).fold(f64::INFINITY, f64::min);
-        if best < FITS_BETTER * first.rms_m {
+        if best < FITS_BETTER * first.rms_m || another_robot {
             return Err(DiagnosisError::NotThisRobot {
                 rms_mm: first.rms_m * 1e3,
                 turn_deg: first.turn_rad.to_degrees(),
@@ -227,7 +243,8 @@ pub(crate) fn first_fit(
     said: &Said,
 ) -> Result<First, DiagnosisError> {
     let weights = vec![1.0; measurements.len()];
-    let readings = geometry::Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[], zeros: &[] };
+    let readings =
+        geometry::Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[], zeros: &[], known: &[] };
     let loose = geometry::fit(arm, readings)?;
     let rows = of_geometry(arm, measurements, loose.clone());
     let mechanism = Mechanism::new(arm);
@@ -247,12 +264,12 @@ pub(crate) fn first_fit(
     let turns = counted.iter().map(|row| of_all(*row) - of_position(*row)).sum::<f64>().max(0.0);
     let turn_rad = libm::sqrt(turns / counted.len() as f64);
     if turn_rad > settings.astray_rad || rms.is_nan() || rms >= settings.astray * reach.max(settings.small_arm_m) {
-        let (hint, explanations) = mistake::hint(arm, said, measurements);
+        let mistake::Hint { text: hint, explanations, .. } = mistake::hint(arm, said, measurements);
         return Err(DiagnosisError::NotThisRobot { rms_mm: rms * 1e3, turn_deg: turn_rad.to_degrees(), hint, explanations });
     }
     if rows.parameters.amax() > settings.implausible {
         let [shift, turn] = rows.largest_errors;
-        let (hint, explanations) = mistake::hint(arm, said, measurements);
+        let mistake::Hint { text: hint, explanations, .. } = mistake::hint(arm, said, measurements);
         return Err(DiagnosisError::NotThisGeometry { shift_mm: shift * 1e3, turn_deg: turn.to_degrees(), hint, explanations });
     }
     Ok(First { far: rows.far, loose, rms_m: rms, turn_rad })
@@ -270,8 +287,15 @@ impl First {
         measurements: &[&Measurement],
     ) -> Result<DVector<f64>, DiagnosisError> {
         let weights = vec![1.0; measurements.len()];
-        let readings =
-            geometry::Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[], zeros: &[] };
+        let readings = geometry::Readings {
+            sensor,
+            measurements,
+            weights: &weights,
+            displacement: &[],
+            scatter: &[],
+            zeros: &[],
+            known: &[],
+        };
         Ok(geometry::shrunk_residual(arm, readings, &self.loose)?)
     }
 }
@@ -283,8 +307,10 @@ impl First {
 pub(crate) fn fit(arm: &Arm, readings: Readings<'_>) -> Result<Rows, DiagnosisError> {
     let Readings { sensor, measurements, weights, displacement, scatter } = readings;
     let scatter: Vec<(usize, f64)> = scatter.iter().map(|one| (one.joint, one.sigma)).collect();
-    let fitted =
-        geometry::fit(arm, geometry::Readings { sensor, measurements, weights, displacement, scatter: &scatter, zeros: &[] })?;
+    let fitted = geometry::fit(
+        arm,
+        geometry::Readings { sensor, measurements, weights, displacement, scatter: &scatter, zeros: &[], known: &[] },
+    )?;
     Ok(of_geometry(arm, measurements, fitted))
 }
 
@@ -303,7 +329,11 @@ fn of_geometry(arm: &Arm, measurements: &[&Measurement], fitted: geometry::Geome
     let turns: Vec<Matrix3<f64>> =
         fitted.measurement_from_root().iter().map(|base| base.rotation.to_rotation_matrix().into_inner()).collect();
     let known = fitted.known().clone();
+    let (measurement_from_root, tool_from_target) = (fitted.measurement_from_root().to_vec(), fitted.tool_from_target().to_vec());
     Rows {
+        measurement_to_target: fitted.measurement_to_target(),
+        measurement_from_root,
+        tool_from_target,
         mechanism,
         turn: fitted.session.iter().map(|session| turns[*session]).collect(),
         parameters: fitted.parameters().clone(),

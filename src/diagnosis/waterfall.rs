@@ -75,22 +75,22 @@ impl<'a> Waterfall<'a> {
     /// stands.
     #[must_use]
     pub(crate) fn together(&self, effects: &[Effect]) -> Vec<Displacement> {
-        let present = |reading: &Reading| -> Vec<Present> {
-            let known = effects.iter().filter_map(|effect| {
-                let signature = effect.signature.as_ref().filter(|signature| signature.shape.can_be_read(reading))?;
-                Some(Present {
-                    location: Location { level: effect.location.level, index: effect.location.index },
-                    shape: signature.shape,
-                    coefficients: signature.coefficients.clone(),
-                })
-            });
-            known.collect()
-        };
-        let of = |(reading, row): (&Reading, &&Measurement)| {
-            let payload_kg = row.payload_kg.unwrap_or(0.0);
-            deflected(&self.rows, reading, payload_kg, &present(reading), Loads::AsItStands).displacement
-        };
+        let of = |(reading, row): (&Reading, &&Measurement)| self.together_at(effects, reading, row.payload_kg.unwrap_or(0.0));
         self.conditions.readings.iter().zip(self.measurements).map(of).collect()
+    }
+
+    /// The same of one `reading`, the tool carrying `payload_kg`.
+    #[must_use]
+    pub(crate) fn together_at(&self, effects: &[Effect], reading: &Reading, payload_kg: f64) -> Displacement {
+        let known = effects.iter().filter_map(|effect| {
+            let signature = effect.signature.as_ref().filter(|signature| signature.shape.can_be_read(reading))?;
+            Some(Present {
+                location: Location { level: effect.location.level, index: effect.location.index },
+                shape: signature.shape,
+                coefficients: signature.coefficients.clone(),
+            })
+        });
+        deflected(&self.rows, reading, payload_kg, &known.collect::<Vec<_>>(), Loads::AsItStands).displacement
     }
 
     /// What `effect` does to the target in each reading (shift in m, turn in rad, in root), to first order: the columns of what it was

@@ -4,16 +4,18 @@
 //! Base and target are free, each session may have a base of its own and each target on the tool has its place. Every joint frame but the
 //! first is off by six small errors ([`FrameErrors`]) with Gaussian priors of the size that machining and assembly leave.
 
-use nalgebra::{DMatrix, DVector, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 
+use super::feature;
+use super::known::{Known, Place};
 use super::least_squares::{difference, turn_to_residual};
-use super::prior::{Evidence, Sizes};
+use super::prior::{Evidence, NO_GROUP, Sizes, group};
 use super::standing::{Standing, stand};
 use crate::arm::chain::FrameErrors;
 use crate::arm::frames::{Pose, pose_from_parts, registration, rotation_from_vector, rotation_vector};
 use crate::arm::{Arm, ChainAt};
 use crate::measurement::equations::{COMPONENTS, Equations};
-use crate::measurement::{Distance, Measurement, Sensor};
+use crate::measurement::{Distance, Feature, Measurement, Sensor};
 use crate::numerics::gram;
 use crate::solver::whitening::Whitening;
 use crate::solver::{Fit, Linearised, Problem, STEP_TOLERANCE, Stop, robust, solve};
@@ -91,6 +93,8 @@ pub struct Readings<'a> {
     pub scatter: &'a [(usize, f64)],
     /// Where the fit begins with each joint's zero, rad or m; empty for nominal.
     pub zeros: &'a [f64],
+    /// What somebody knows of the arm beforehand.
+    pub known: &'a [Known],
 }
 
 /// A fitted geometry, and what it leaves of the readings.
@@ -102,8 +106,8 @@ pub struct Geometry {
     pub sessions: Vec<String>,
     /// Names of the targets.
     pub targets: Vec<String>,
-    /// Names of the fixed points.
-    pub points: Vec<String>,
+    /// Points and planes on which the target was.
+    pub features: Vec<Feature>,
     /// What known distances of fixed points say: whitened residuals, and what one prior sigma of each parameter does to them.
     distances: (DVector<f64>, DMatrix<f64>),
     /// Session of each row.
@@ -120,6 +124,10 @@ pub struct Geometry {
     pub jacobian: DMatrix<f64>,
     /// Which parameters are free (base and target).
     pub free: Vec<bool>,
+    /// One sigma of each parameter's prior, m or rad; zero where it is held.
+    sigma: Vec<f64>,
+    /// What each parameter is about ([`group`]).
+    group: Vec<usize>,
     /// Weight of each row beside those asked for: less than one where it is far off from what the others say.
     pub far: Vec<f64>,
     /// Mean square of the noise over the declared one, where it is larger than that; else one.
@@ -155,7 +163,7 @@ impl Geometry {
             equations: self.equations_that_count() + of_distances.len(),
             parameters: &self.placed.parameters,
             free: &self.free,
-            group: Evidence::groups(&self.frames, self.placed.before, &self.free),
+            group: &self.group,
             sizes: self.placed.sizes,
         };
         evidence.likeliest()
@@ -231,7 +239,13 @@ impl Geometry {
     /// The fitted arm from its root to its tool.
     #[must_use]
     pub fn root_to_tool(&self) -> ChainAt {
-        self.frames.at(&Pose::identity(), &self.placed.errors(&self.frames), &Pose::identity())
+        self.frames.at(&Pose::identity(), &self.placed.errors(), &Pose::identity())
+    }
+
+    /// The fitted arm from the measurement frame to the target: those of the first session and target.
+    #[must_use]
+    pub fn measurement_to_target(&self) -> ChainAt {
+        self.frames.at(&self.placed.measurement_from_root[0], &self.placed.errors(), &self.placed.tool_from_target[0])
     }
 
     /// The pose of its target at which `measurement` should have found it. A session or target that was not fitted counts as the first.
@@ -242,35 +256,33 @@ impl Geometry {
         };
         let (session, target) = (number(&self.sessions, &measurement.session), number(&self.targets, &measurement.target));
         let base = &self.placed.measurement_from_root[session];
-        let arm = self.frames.at(base, &self.placed.errors(&self.frames), &self.placed.tool_from_target[target]);
+        let arm = self.frames.at(base, &self.placed.errors(), &self.placed.tool_from_target[target]);
         let mut pose = arm.forward(&measurement.joints);
-        if let Some(label) = &measurement.fixed_point {
-            let point = self.points.iter().position(|known| known == label);
-            pose.translation.vector -= point.map_or(Vector3::zeros(), |point| self.placed.points[point]);
+        let known = measurement.feature().and_then(|of| self.features.iter().position(|known| *known == of));
+        if let Some(feature) = known {
+            pose = self.placed.features[feature].inverse() * pose;
         }
         pose
     }
 
-    /// Where the fixed points are in the measurement frame, m.
+    /// Pose of each of [`Geometry::features`] in the measurement frame: of a point its place, of a plane with the normal as z.
     #[must_use]
-    pub fn fixed_points(&self) -> &[Vector3<f64>] {
-        &self.placed.points
+    pub fn poses_of_features(&self) -> &[Pose] {
+        &self.placed.features
     }
 
-    /// With the fixed points of `measurements` that were not fitted, each in the middle of where the arm says that its readings are.
+    /// With the points and planes of `measurements` that were not fitted, each through where the arm says that its readings are.
     #[must_use]
-    pub fn with_points_of(mut self, measurements: &[Measurement]) -> Geometry {
-        let labels: Vec<&String> = measurements.iter().filter_map(|row| row.fixed_point.as_ref()).collect();
-        for label in labels {
-            if self.points.contains(label) {
+    pub fn with_features_of(mut self, measurements: &[Measurement]) -> Geometry {
+        for of in measurements.iter().filter_map(Measurement::feature) {
+            if self.features.contains(&of) {
                 continue;
             }
-            // Where a point is not known, predictions are in the measurement frame.
-            let own = measurements.iter().filter(|row| row.fixed_point.as_ref() == Some(label));
-            let (sum, count) =
-                own.fold((Vector3::zeros(), 0.0), |(sum, count), row| (sum + self.predict(row).translation.vector, count + 1.0));
-            self.points.push(label.clone());
-            self.placed.points.push(sum / count);
+            // What is not known yet is predicted in the measurement frame.
+            let own = measurements.iter().filter(|row| row.feature().as_ref() == Some(&of));
+            let points: Vec<Vector3<f64>> = own.map(|row| self.predict(row).translation.vector).collect();
+            self.placed.features.push(feature::through(&of, &points));
+            self.features.push(of);
         }
         self
     }
@@ -290,7 +302,7 @@ impl Geometry {
     /// Largest error of a frame along an axis (m) and about one (rad).
     #[must_use]
     pub fn largest_errors(&self) -> [f64; 2] {
-        let errors = self.placed.errors(&self.frames);
+        let errors = self.placed.errors();
         let largest = |turns: bool| {
             let of = errors.iter().enumerate().filter(|(at, _)| (at % FrameErrors::PER_FRAME >= 3) == turns);
             of.map(|(_, value)| value.abs()).fold(0.0, f64::max)
@@ -332,8 +344,9 @@ pub(super) fn fit_roughly(arm: &Arm, readings: Readings<'_>, sizes: Sizes) -> Re
 
 fn fit_to(arm: &Arm, readings: Readings<'_>, sizes: Sizes, tolerance: f64) -> Result<Geometry, GeometryError> {
     let (mut names, mut session) = numbered(readings.measurements, |row| row.session.as_deref());
-    if readings.measurements.iter().all(|row| row.fixed_point.is_some()) {
-        // Fixed points are in no frame but the arm's own.
+    if !readings.measurements.iter().any(|row| row.is_in_frame()) || readings.known.iter().any(|known| known.place == Place::Base)
+    {
+        // Features are in no frame but the arm's own.
         names.truncate(1);
         session.fill(0);
     }
@@ -382,12 +395,12 @@ impl Geometry {
 
     fn refit_to(&self, arm: &Arm, readings: Readings<'_>, sizes: Sizes, tolerance: f64) -> Result<Geometry, GeometryError> {
         let mut problem = Placing::new(arm, readings, &self.session, self.sessions.len(), sizes)?;
-        let errors = self.placed.errors(&self.frames);
-        let mut start = Placed { sizes, ..self.placed.clone() };
-        // Points that were added afterwards are none of these readings.
-        start.points.truncate(problem.points.len());
+        let errors = self.placed.errors();
+        let mut start = Placed { sizes, sigma: problem.sigma_of_frames(), ..self.placed.clone() };
+        // Features that were added afterwards are none of these readings.
+        start.features.truncate(problem.features.len());
         for (at, error) in errors.iter().enumerate() {
-            let sigma = sizes.sigma(&self.frames, at);
+            let sigma = start.sigma[at];
             start.parameters[start.before + at] = if sigma > 0.0 { error / sigma } else { 0.0 };
         }
         (problem.far, problem.level) = (self.far.clone(), self.level);
@@ -398,7 +411,7 @@ impl Geometry {
     /// Errors of the joint frames from the second on, six each (m, rad), in the frame in which the joint moves about or along z.
     #[must_use]
     pub fn frame_errors(&self) -> Vec<f64> {
-        self.placed.errors(&self.frames)
+        self.placed.errors()
     }
 
     /// What is known besides the readings (distances of fixed points, or the arm's size where nothing tells it): residuals in sigmas, and
@@ -428,17 +441,18 @@ impl Geometry {
         let mut normal = gram(&jacobian) + gram(&self.distances.1);
         (0..normal.nrows()).for_each(|at| normal[(at, at)] += 1.0);
         let mut covariance = normal.cholesky()?.inverse();
-        let sigma: Vec<f64> = (0..self.free.len()).map(|column| self.sigma_of(column)).collect();
-        for (row, of_row) in sigma.iter().enumerate() {
-            for (column, of_column) in sigma.iter().enumerate() {
+        for (row, of_row) in self.sigma.iter().enumerate() {
+            for (column, of_column) in self.sigma.iter().enumerate() {
                 covariance[(row, column)] *= of_row * of_column;
             }
         }
         Some(covariance)
     }
 
-    fn sigma_of(&self, column: usize) -> f64 {
-        if self.free[column] { FREE } else { self.placed.sizes.sigma(&self.frames, column - self.placed.before) }
+    /// One sigma of the prior of the frames' error number `at`, m or rad.
+    #[must_use]
+    pub fn sigma_of_frame_error(&self, at: usize) -> f64 {
+        self.placed.sigma[at]
     }
 }
 
@@ -465,7 +479,7 @@ fn fit_with(
     let start = problem.start(arm)?;
     let of_free: Vec<usize> = (0..problem.free.len()).filter(|column| problem.free[*column]).collect();
     // Base and target first: what is fitted with them far off would throw the frames about.
-    let placed = problem.robustly(&of_free, start, STEPS[0]).point;
+    let placed = if of_free.is_empty() { start } else { problem.robustly(&of_free, start, STEPS[0]).point };
     let all: Vec<usize> = (0..problem.free.len()).filter(|column| problem.sigma[*column] > 0.0).collect();
     // Errors that are larger than those of most readings, far off or hidden in the fit: they had better not pull at all.
     let plain = problem.robustly(&all, placed.clone(), STEPS[1]).point;
@@ -499,7 +513,7 @@ fn finish(mut problem: Placing<'_>, start: Placed, sessions: Vec<String>, tolera
     problem.whiten(&fit.point);
     let (residual, jacobian) = problem.raw(&fit.point);
     let distances = problem.distances(&fit.point);
-    let placed_in_frame = problem.readings.measurements.iter().any(|row| row.fixed_point.is_none());
+    let placed_in_frame = problem.readings.measurements.iter().any(|row| row.is_in_frame());
     Geometry {
         far,
         level: problem.level,
@@ -510,10 +524,12 @@ fn finish(mut problem: Placing<'_>, start: Placed, sessions: Vec<String>, tolera
         residual,
         jacobian,
         free,
+        sigma: problem.sigma,
+        group: problem.group,
         sessions,
         session: problem.session.to_vec(),
         targets: problem.targets,
-        points: problem.points,
+        features: problem.features,
         distances,
         placed_in_frame,
         target: problem.target,
@@ -529,8 +545,8 @@ fn finish(mut problem: Placing<'_>, start: Placed, sessions: Vec<String>, tolera
 struct Placed {
     measurement_from_root: Vec<Pose>,
     tool_from_target: Vec<Pose>,
-    /// Fixed points in the measurement frame.
-    points: Vec<Vector3<f64>>,
+    /// Points and planes in the measurement frame.
+    features: Vec<Pose>,
     /// Of the frames, over the sigmas of their priors; zero for bases and targets, which are in the poses above.
     parameters: DVector<f64>,
     /// Bases, which come before the frames.
@@ -539,13 +555,14 @@ struct Placed {
     count: usize,
     /// Sizes of the frames' priors.
     sizes: Sizes,
+    /// One sigma of each frame error's prior, m or rad.
+    sigma: Vec<f64>,
 }
 
 impl Placed {
     /// Errors of the frames, m and rad.
-    fn errors(&self, frames: &FrameErrors) -> Vec<f64> {
-        let values = self.parameters.rows(self.before, self.count);
-        values.iter().enumerate().map(|(at, value)| value * self.sizes.sigma(frames, at)).collect()
+    fn errors(&self) -> Vec<f64> {
+        self.parameters.rows(self.before, self.count).iter().zip(&self.sigma).map(|(value, sigma)| value * sigma).collect()
     }
 }
 
@@ -556,17 +573,19 @@ struct Placing<'a> {
     session: &'a [usize],
     targets: Vec<String>,
     target: Vec<usize>,
-    points: Vec<String>,
-    /// Fixed point of each row.
-    point: Vec<Option<usize>>,
+    features: Vec<Feature>,
+    /// Feature of each row.
+    feature: Vec<Option<usize>>,
     equations: Equations,
     whitening: Whitening,
     bases: usize,
     /// Columns of a target: its turn shows only where orientations are read.
     per_target: usize,
     free: Vec<bool>,
-    /// Of each column's prior, m or rad.
+    /// Of each column's prior, m or rad; zero where it is held.
     sigma: Vec<f64>,
+    /// What each column is about ([`group`]).
+    group: Vec<usize>,
     /// Weight of each row for being far off; empty for one.
     far: Vec<f64>,
     /// Mean square of the noise over the declared one: the prior's sigmas are true ones, so that they count for more where the noise is
@@ -600,14 +619,29 @@ impl<'a> Placing<'a> {
         let equations = Equations::new(readings.sensor, measurements);
         let per_target = if equations.has_orientation() { 6 } else { 3 };
         let (before, count) = (FrameErrors::PER_FRAME * bases, FrameErrors::PER_FRAME * frames.frames());
-        let mut points: Vec<String> = measurements.iter().filter_map(|row| row.fixed_point.clone()).collect();
-        points.sort_unstable();
-        points.dedup();
-        let of_row = |row: &&Measurement| row.fixed_point.as_ref().and_then(|label| points.binary_search(label).ok());
-        let point: Vec<Option<usize>> = measurements.iter().map(of_row).collect();
-        let width = before + count + per_target * targets.len() + 3 * points.len();
-        let free: Vec<bool> = (0..width).map(|column| !(before..before + count).contains(&column)).collect();
-        let sigma = (0..width).map(|column| if free[column] { FREE } else { sizes.sigma(&frames, column - before) }).collect();
+        let mut features: Vec<Feature> = measurements.iter().filter_map(|row| row.feature()).collect();
+        features.sort_unstable();
+        features.dedup();
+        let of_row = |row: &&Measurement| row.feature().and_then(|of| features.binary_search(&of).ok());
+        let feature: Vec<Option<usize>> = measurements.iter().map(of_row).collect();
+        let width = before + count + per_target * targets.len() + feature::UNKNOWNS * features.len();
+        let is_of_frames = |column: usize| (before..before + count).contains(&column);
+        let mut free: Vec<bool> = (0..width).map(|column| !is_of_frames(column)).collect();
+        let mut sigma: Vec<f64> =
+            (0..width).map(|column| if free[column] { FREE } else { sizes.sigma(&frames, column - before) }).collect();
+        let mut groups: Vec<usize> =
+            (0..width).map(|column| if free[column] { NO_GROUP } else { group(&frames, column - before) }).collect();
+        let of_targets = before + count..before + count + per_target * targets.len();
+        for Known { place, sigma: known } in readings.known {
+            let columns = match place {
+                Place::Base => 0..before,
+                Place::Target => of_targets.clone(),
+                Place::Frame(at) => before + at..before + at + usize::from(*at < count),
+            };
+            for column in columns {
+                (free[column], sigma[column], groups[column]) = (false, *known, NO_GROUP);
+            }
+        }
         let whitening = Whitening::new(&equations, inverse_sigmas(&equations), readings.weights);
         let (far, level) = (Vec::new(), 1.0);
         Ok(Placing {
@@ -616,14 +650,15 @@ impl<'a> Placing<'a> {
             session,
             targets,
             target,
-            points,
-            point,
+            features,
+            feature,
             equations,
             whitening,
             bases,
             per_target,
             free,
             sigma,
+            group: groups,
             far,
             level,
             sizes,
@@ -648,19 +683,26 @@ impl<'a> Placing<'a> {
             stand(&tools, &read, &target, self.targets.len())
         };
         let of_session = |base: usize| {
-            let own = |row: &usize| self.session[*row] == base && self.point[*row].is_none();
+            let own = |row: &usize| self.session[*row] == base && self.feature[*row].is_none();
             (0..measurements.len()).filter(own).collect::<Vec<usize>>()
         };
         // Of sessions with bases of their own the longest tells where the targets are.
         let rows = (0..self.bases).map(of_session).max_by_key(Vec::len).unwrap_or_default();
-        let all = if rows.is_empty() { self.about_points(&poses) } else { of(&rows) };
-        let all = all.ok_or(GeometryError::Degenerate)?;
+        let all = if rows.is_empty() { self.on_features(&poses) } else { of(&rows) };
+        let mut all = all.ok_or(GeometryError::Degenerate)?;
+        let is_held = |place: Place| self.readings.known.iter().any(|known| known.place == place);
+        if is_held(Place::Target) {
+            all.tool_from_target.iter_mut().for_each(|target| *target = Pose::identity());
+        }
+        if is_held(Place::Base) {
+            all.measurement_from_root = Pose::identity();
+        }
         let tool_from_target = all.tool_from_target;
         let base_of = |base: usize| {
             let rows = of_session(base);
             let whole: Vec<usize> = rows.iter().copied().filter(|row| measurements[*row].unread == [false; 3]).collect();
             let rows = if whole.is_empty() { rows } else { whole };
-            if self.bases == 1 || rows.len() < OWN_START {
+            if self.bases == 1 || rows.len() < OWN_START || is_held(Place::Base) {
                 return None;
             }
             let from: Vec<Vector3<f64>> =
@@ -670,12 +712,11 @@ impl<'a> Placing<'a> {
         };
         let measurement_from_root = (0..self.bases).map(|base| base_of(base).unwrap_or(all.measurement_from_root)).collect();
         let measurement_from_root: Vec<Pose> = measurement_from_root;
-        let mut points = vec![(Vector3::zeros(), 0.0); self.points.len()];
-        for (row, point) in self.point.iter().enumerate() {
-            if let Some((sum, count)) = point.map(|point| &mut points[point]) {
+        let mut points = vec![Vec::new(); self.features.len()];
+        for (row, feature) in self.feature.iter().enumerate() {
+            if let Some(points) = feature.map(|feature| &mut points[feature]) {
                 let base = &measurement_from_root[self.session[row]];
-                *sum += (base * poses[row] * tool_from_target[self.target[row]]).translation.vector;
-                *count += 1.0;
+                points.push((base * poses[row] * tool_from_target[self.target[row]]).translation.vector);
             }
         }
         let mut parameters = DVector::zeros(self.free.len());
@@ -687,58 +728,34 @@ impl<'a> Placing<'a> {
         Ok(Placed {
             measurement_from_root,
             tool_from_target,
-            points: points.into_iter().map(|(sum, count)| sum / count).collect(),
+            features: self.features.iter().zip(&points).map(|(of, points)| feature::through(of, points)).collect(),
             parameters,
             before: FrameErrors::PER_FRAME * self.bases,
             count: FrameErrors::PER_FRAME * self.frames.frames(),
             sizes: self.sizes,
+            sigma: self.sigma_of_frames(),
         })
     }
 
-    /// The targets on the tool at which the readings of each fixed point come nearest to one another, the arm at its root: linear least
-    /// squares about each point's mean.
-    fn about_points(&self, poses: &[Pose]) -> Option<Standing> {
-        let targets = self.targets.len();
-        let width = 3 * targets;
-        let rows: Vec<(usize, DVector<f64>, DMatrix<f64>)> = (0..poses.len())
-            .filter_map(|row| {
-                let mut matrix = DMatrix::zeros(3, width);
-                matrix.view_mut((0, 3 * self.target[row]), (3, 3)).copy_from(poses[row].rotation.to_rotation_matrix().matrix());
-                let at = DVector::from_column_slice(poses[row].translation.vector.as_slice());
-                Some((self.point[row]?, at, matrix))
-            })
-            .collect();
-        let mut means = vec![(DVector::zeros(3), DMatrix::zeros(3, width), 0.0); self.points.len()];
-        for (point, at, matrix) in &rows {
-            let (sum, matrices, count) = &mut means[*point];
-            *sum += at;
-            *matrices += matrix;
-            *count += 1.0;
-        }
-        let mut normal = DMatrix::identity(width, width) * 1e-9;
-        let mut right = DVector::zeros(width);
-        for (point, at, matrix) in &rows {
-            let (sum, matrices, count) = &means[*point];
-            let (off, matrix) = (at - sum / *count, matrix - matrices / *count);
-            normal += matrix.tr_mul(&matrix);
-            right -= matrix.tr_mul(&off);
-        }
-        let offsets = normal.cholesky()?.solve(&right);
-        let target = |number: usize| {
-            let at = Vector3::new(offsets[3 * number], offsets[3 * number + 1], offsets[3 * number + 2]);
-            Pose::from_parts(at.into(), Default::default())
-        };
+    fn sigma_of_frames(&self) -> Vec<f64> {
+        let before = FrameErrors::PER_FRAME * self.bases;
+        self.sigma[before..before + FrameErrors::PER_FRAME * self.frames.frames()].to_vec()
+    }
+
+    /// The arm at its root, and targets on the tool at which the readings of each feature come nearest to one another.
+    fn on_features(&self, poses: &[Pose]) -> Option<Standing> {
+        let targets = feature::targets(poses, &self.target, &self.feature, &self.features, self.targets.len())?;
         Some(Standing {
             measurement_from_root: Pose::identity(),
-            tool_from_target: (0..targets).map(target).collect(),
+            tool_from_target: targets.into_iter().map(|at| Pose::translation(at.x, at.y, at.z)).collect(),
             left_m: 0.0,
             spread_m: 0.0,
         })
     }
 
-    /// First column of the fixed points.
-    fn first_of_points(&self) -> usize {
-        self.free.len() - 3 * self.points.len()
+    /// First column of the features.
+    fn first_of_features(&self) -> usize {
+        self.free.len() - feature::UNKNOWNS * self.features.len()
     }
 
     /// What the known distances of fixed points say about `placed`: whitened residuals and Jacobian.
@@ -749,11 +766,12 @@ impl<'a> Placing<'a> {
             .distances
             .iter()
             .filter_map(|of| {
-                Some((self.points.binary_search(&of.point_a).ok()?, self.points.binary_search(&of.point_b).ok()?, of))
+                let point = |label: &String| self.features.binary_search(&Feature::Point(label.clone())).ok();
+                Some((point(&of.point_a)?, point(&of.point_b)?, of))
             })
             .collect();
-        // Readings of fixed points alone leave the size of the arm open, and least squares would shrink it to a point.
-        let sized = !known.is_empty() || self.point.iter().any(Option::is_none);
+        // Readings on features alone leave the size of the arm open, and least squares would shrink it to a point.
+        let sized = !known.is_empty() || self.feature.iter().any(Option::is_none);
         let (count, more) = (known.len(), usize::from(!sized));
         let mut residual = DVector::zeros(count + more);
         let mut jacobian = DMatrix::zeros(count + more, self.free.len());
@@ -768,14 +786,14 @@ impl<'a> Placing<'a> {
             }
         }
         for (row, (a, b, of)) in known.into_iter().enumerate() {
-            let apart = placed.points[a] - placed.points[b];
+            let apart = placed.features[a].translation.vector - placed.features[b].translation.vector;
             let length = apart.norm().max(SMALLEST_SIGMA);
             let sigma = of.sigma_m.max(SMALLEST_SIGMA);
             residual[row] = (of.distance_m - length) / sigma;
             for axis in 0..3 {
                 let change = apart[axis] / length / sigma * FREE;
-                jacobian[(row, self.first_of_points() + 3 * a + axis)] = change;
-                jacobian[(row, self.first_of_points() + 3 * b + axis)] = -change;
+                jacobian[(row, self.first_of_features() + feature::UNKNOWNS * a + axis)] = change;
+                jacobian[(row, self.first_of_features() + feature::UNKNOWNS * b + axis)] = -change;
             }
         }
         (residual, jacobian)
@@ -783,7 +801,7 @@ impl<'a> Placing<'a> {
 
     /// The chain of each pair of session and target, and where its Jacobian's columns belong.
     fn chains(&self, placed: &Placed) -> Vec<(ChainAt, Vec<Option<usize>>)> {
-        let errors = placed.errors(&self.frames);
+        let errors = placed.errors();
         let mut chains = Vec::with_capacity(self.bases * self.targets.len());
         for (session, base) in placed.measurement_from_root.iter().enumerate() {
             for (target, of_target) in placed.tool_from_target.iter().enumerate() {
@@ -809,8 +827,8 @@ impl<'a> Placing<'a> {
             predicted.translation.vector += turn * Vector3::new(*x, *y, *z);
             predicted.rotation = rotation_from_vector(&(turn * Vector3::new(*rx, *ry, *rz))) * predicted.rotation;
         }
-        if let Some(point) = self.point[row] {
-            predicted.translation.vector -= placed.points[point];
+        if let Some(feature) = self.feature[row] {
+            predicted = placed.features[feature].inverse() * predicted;
         }
         difference(self.readings.measurements[row], &predicted)
     }
@@ -839,6 +857,14 @@ impl<'a> Placing<'a> {
             let (chain, place) = &chains[self.chain_of(row)];
             let (axes, origin) = chain.jacobian_into(&measurement.joints, &mut buffer, columns);
             let error = self.difference(row, placed, pose_from_parts(&axes, &origin));
+            let mut of_feature = Matrix3::zeros();
+            if let Some(number) = self.feature[row] {
+                let (of, pose) = (&self.features[number], &placed.features[number]);
+                of_feature = feature::derivative(of, &(pose.inverse() * nalgebra::Point3::from(origin)).coords);
+                if let Feature::Plane(_) = of {
+                    into_axes(&mut buffer, columns, &pose.rotation.to_rotation_matrix().into_inner());
+                }
+            }
             turn_to_residual(&mut buffer[3 * columns..], columns, &error.fixed_rows::<3>(3).into_owned());
             for equation in self.equations.of(row) {
                 let component = self.equations.component(equation);
@@ -848,9 +874,11 @@ impl<'a> Placing<'a> {
                         jacobian[(equation, *column)] = value * self.sigma[*column];
                     }
                 }
-                if let (Some(point), 0..3) = (self.point[row], component) {
-                    let column = self.first_of_points() + 3 * point + component;
-                    jacobian[(equation, column)] = -self.sigma[column];
+                if let (Some(feature), 0..3) = (self.feature[row], component) {
+                    for unknown in 0..feature::UNKNOWNS {
+                        let column = self.first_of_features() + feature::UNKNOWNS * feature + unknown;
+                        jacobian[(equation, column)] = of_feature[(component, unknown)] * self.sigma[column];
+                    }
                 }
             }
         }
@@ -917,8 +945,18 @@ impl<'a> Placing<'a> {
         (far, robust::level(&squares, &counts))
     }
 
+    /// Axes of the features on which rows are that have axes of their own; empty where none has.
+    fn axes(&self, placed: &Placed) -> Vec<Option<Matrix3<f64>>> {
+        if !self.features.iter().any(|of| matches!(of, Feature::Plane(_))) {
+            return Vec::new();
+        }
+        let of = |feature: usize| placed.features[feature].rotation.to_rotation_matrix().into_inner();
+        self.feature.iter().map(|feature| feature.map(of)).collect()
+    }
+
     /// Whitens with what scatter does about `placed`.
     fn whiten(&mut self, placed: &Placed) {
+        self.equations.set_axes(self.axes(placed));
         let far = |row: usize| self.far.get(row).copied().unwrap_or(1.0);
         let weights: Vec<f64> = self.readings.weights.iter().enumerate().map(|(row, weight)| weight * far(row)).collect();
         let whitening = Whitening::new(&self.equations, inverse_sigmas(&self.equations), &weights);
@@ -937,6 +975,16 @@ impl<'a> Placing<'a> {
         };
         let scattered: Vec<Vec<DVector<f64>>> = self.readings.measurements.iter().enumerate().map(of_row).collect();
         self.whitening = whitening.with(&scattered);
+    }
+}
+
+/// Turns the rows of a pose's Jacobian (linear, then angular, of this many columns) into components along `axes` (columns).
+pub(super) fn into_axes(rows: &mut [f64], columns: usize, axes: &Matrix3<f64>) {
+    for half in rows.chunks_exact_mut(3 * columns) {
+        for column in 0..columns {
+            let turned = axes.tr_mul(&Vector3::new(half[column], half[columns + column], half[2 * columns + column]));
+            (0..3).for_each(|axis| half[axis * columns + column] = turned[axis]);
+        }
     }
 }
 
@@ -985,9 +1033,10 @@ impl Problem for Placing<'_> {
         for column in from.before..after {
             to.parameters[column] += change[column];
         }
-        let first = self.first_of_points();
-        for (point, place) in to.points.iter_mut().enumerate() {
-            (0..3).for_each(|axis| place[axis] += change[first + 3 * point + axis] * self.sigma[first + 3 * point + axis]);
+        for (number, pose) in to.features.iter_mut().enumerate() {
+            let first = self.first_of_features() + feature::UNKNOWNS * number;
+            let by = Vector3::from_fn(|unknown, _| change[first + unknown] * self.sigma[first + unknown]);
+            *pose = feature::moved(&self.features[number], pose, &by);
         }
         to
     }
@@ -1022,7 +1071,7 @@ mod tests {
         let frames: Vec<mdh::Frame> = (0..=count).map(|_| frame()).collect();
         let joint = |number: usize| {
             let kind = if number % 4 == 2 { JointKind::Prismatic } else { JointKind::Revolute };
-            Joint { name: format!("j{number}"), kind, lower: -1.5, upper: 1.5 }
+            Joint { name: format!("j{number}"), kind, lower: -1.5, upper: 1.5, mimic: None }
         };
         Arm {
             name: "drawn".to_owned(),
@@ -1088,6 +1137,7 @@ mod tests {
                 displacement: &[],
                 scatter: &[],
                 zeros: &[],
+                known: &[],
             };
             let found = fit(&arm, of).unwrap();
             assert_eq!((found.stop, found.sessions.len()), (Stop::Converged, sessions));
@@ -1105,8 +1155,15 @@ mod tests {
         let mut rows = readings(&arm, 60, 1, 0.1, 0.0, &mut stream);
         let (unmoved, weights, sensor) = (rows.clone(), vec![1.0; rows.len()], sensor(true));
         let read: Vec<&Measurement> = unmoved.iter().collect();
-        let whole =
-            Readings { sensor: &sensor, measurements: &read, weights: &weights, displacement: &[], scatter: &[], zeros: &[] };
+        let whole = Readings {
+            sensor: &sensor,
+            measurements: &read,
+            weights: &weights,
+            displacement: &[],
+            scatter: &[],
+            zeros: &[],
+            known: &[],
+        };
         let before = fit(&arm, whole).unwrap();
         let turn = before.measurement_from_root()[0].rotation;
         let displacement: Vec<[f64; 6]> = (0..60).map(|_| std::array::from_fn(|_| stream.uniform(-1e-3, 1e-3))).collect();
@@ -1144,6 +1201,7 @@ mod tests {
                 displacement: &[],
                 scatter: &[],
                 zeros: &[],
+                known: &[],
             };
             let square = |found: &Geometry| -> f64 {
                 others.iter().map(|row| difference(row, &found.predict(row)).fixed_rows::<3>(0).norm_squared()).sum()
@@ -1164,6 +1222,7 @@ mod tests {
             displacement: &[],
             scatter: &[],
             zeros: &[],
+            known: &[],
         };
         let sizes = fit(&arm, of).unwrap().likeliest_sizes();
         assert_eq!((sizes.lengths, sizes.turns), (0.3, 0.3), "{sizes:?}");
@@ -1196,6 +1255,7 @@ mod tests {
                     displacement: &[],
                     scatter: &[],
                     zeros: &[],
+                    known: &[],
                 };
                 let found = fit(&arm, of).unwrap();
                 others.iter().map(|row| difference(row, &found.predict(row)).fixed_rows::<3>(0).norm_squared()).sum()
@@ -1207,42 +1267,43 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(24))]
+            #![proptest_config(ProptestConfig::with_cases(24))]
 
-        /// Whatever the arm, the readings (sound or not), what was read of them, the weights and the start.
-        #[test]
-        fn no_step_of_a_geometry_raises_the_cost(
-            seed in 0u64..1_000_000, joints in 2usize..8, count in 8usize..24, wrong in 0.0..20.0f64, noise in 0.0..0.3f64,
-            orientation: bool, sessions in 1usize..3, away in 0.0..1.5f64, scale in 0.003..3.0f64,
-        ) {
-            let mut stream = stream(seed, "test/geometry/descent");
-            let arm = arm(joints, &mut stream);
-            let mut rows = readings(&arm, count, sessions, wrong, noise, &mut stream);
-            for row in &mut rows {
-                row.unread[2] = stream.unit() < 0.3;
-            }
-            let read: Vec<&Measurement> = rows.iter().collect();
-            let weights: Vec<f64> = (0..count).map(|_| stream.unit()).collect();
-            let session: Vec<usize> = (0..count).map(|row| row % sessions).collect();
-            let of = Readings {
-                sensor: &sensor(orientation),
-                measurements: &read,
-                weights: &weights,
-                displacement: &[],
-                scatter: &[],
-                zeros: &[],
-            };
-            let problem = Placing::new(&arm, of, &session, sessions, Sizes { zeros: scale, lengths: scale, turns: scale }).unwrap();
-            let all: Vec<usize> = (0..problem.free.len()).collect();
-            let start = problem.start(&arm).unwrap();
-            let step = DVector::from_fn(all.len(), |_, _| away * stream.normal());
-            let start = problem.moved(&start, &all, &step);
-            let mut before = problem.linearise(&start).cost();
-            for most in 1..16 {
-                let cost = solve(&problem, &all, start.clone(), most).linearised.cost();
-                prop_assert!(cost <= before * (1.0 + 1e-11), "{before} became {cost} in step {most}");
-                before = cost;
+            /// Whatever the arm, the readings (sound or not), what was read of them, the weights and the start.
+            #[test]
+            fn no_step_of_a_geometry_raises_the_cost(
+                seed in 0u64..1_000_000, joints in 2usize..8, count in 8usize..24, wrong in 0.0..20.0f64, noise in 0.0..0.3f64,
+                orientation: bool, sessions in 1usize..3, away in 0.0..1.5f64, scale in 0.003..3.0f64,
+            ) {
+                let mut stream = stream(seed, "test/geometry/descent");
+                let arm = arm(joints, &mut stream);
+                let mut rows = readings(&arm, count, sessions, wrong, noise, &mut stream);
+                for row in &mut rows {
+                    row.unread[2] = stream.unit() < 0.3;
+                }
+                let read: Vec<&Measurement> = rows.iter().collect();
+                let weights: Vec<f64> = (0..count).map(|_| stream.unit()).collect();
+                let session: Vec<usize> = (0..count).map(|row| row % sessions).collect();
+                let of = Readings {
+                    sensor: &sensor(orientation),
+                    measurements: &read,
+                    weights: &weights,
+                    displacement: &[],
+                    scatter: &[],
+                    zeros: &[],
+    known: &[],
+                };
+                let problem = Placing::new(&arm, of, &session, sessions, Sizes { zeros: scale, lengths: scale, turns: scale }).unwrap();
+                let all: Vec<usize> = (0..problem.free.len()).collect();
+                let start = problem.start(&arm).unwrap();
+                let step = DVector::from_fn(all.len(), |_, _| away * stream.normal());
+                let start = problem.moved(&start, &all, &step);
+                let mut before = problem.linearise(&start).cost();
+                for most in 1..16 {
+                    let cost = solve(&problem, &all, start.clone(), most).linearised.cost();
+                    prop_assert!(cost <= before * (1.0 + 1e-11), "{before} became {cost} in step {most}");
+                    before = cost;
+                }
             }
         }
-    }
 }

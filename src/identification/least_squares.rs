@@ -2,13 +2,14 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 
-use super::geometry::GeometryError;
+use super::feature;
+use super::geometry::{Geometry, GeometryError, into_axes};
 use super::outcome::{Combination, DeclaredNoise, Errors, Identification, ParameterEstimate, Residual, Summary};
 use crate::arm::Arm;
 use crate::arm::ChainAt;
 use crate::arm::frames::{Pose, pose_error};
 use crate::measurement::equations::Equations;
-use crate::measurement::{Measurement, Role, Sensor, Weights};
+use crate::measurement::{Feature, Measurement, Role, Sensor, Weights};
 use crate::numerics::distribution::{NORMAL_95, chi_squared_tail, student_quantile};
 use crate::numerics::{gram, product, scaled_inverse};
 use crate::quality::subspace::{Subspace, late};
@@ -461,6 +462,8 @@ pub(super) struct Plain<'a> {
     equations: Equations,
     /// Weight of each equation.
     weights: Vec<f64>,
+    /// Points and planes on which the target was, and their poses in the measurement frame.
+    features: Vec<(Feature, Pose)>,
 }
 
 struct NoiseScale {
@@ -494,7 +497,13 @@ impl<'a> Plain<'a> {
             Weights::Noise => Ok(1.0 / sigma),
         };
         let weights = equations.sigmas().iter().enumerate().map(of_equation).collect::<Result<_, _>>()?;
-        Ok(Plain { arm, measurements, equations, weights })
+        Ok(Plain { arm, measurements, equations, weights, features: Vec::new() })
+    }
+
+    /// With the points and planes of `geometry`.
+    pub(super) fn with_features(mut self, geometry: &Geometry) -> Self {
+        self.features = geometry.features.iter().cloned().zip(geometry.poses_of_features().iter().copied()).collect();
+        self
     }
 
     /// What the measurements tell.
@@ -502,23 +511,30 @@ impl<'a> Plain<'a> {
         &self.equations
     }
 
-    /// Takes out what the place of a fixed point, which nobody knows, does to its readings: their mean.
-    fn about_points(&self, residuals: &mut DVector<f64>, jacobian: &mut DMatrix<f64>) {
-        let mut labels: Vec<&String> = self.measurements.iter().filter_map(|row| row.fixed_point.as_ref()).collect();
-        labels.sort_unstable();
-        labels.dedup();
-        for label in labels {
-            let rows = (0..self.measurements.len()).filter(|row| self.measurements[*row].fixed_point.as_ref() == Some(label));
-            let equations: Vec<usize> = rows.flat_map(|row| self.equations.of_position(row)).collect();
-            for component in 0..3 {
-                let own: Vec<usize> = equations.iter().copied().filter(|of| self.equations.component(*of) == component).collect();
-                let count = own.len().max(1) as f64;
-                let mean = own.iter().map(|of| residuals[*of]).sum::<f64>() / count;
-                own.iter().for_each(|of| residuals[*of] -= mean);
-                for mut column in jacobian.column_iter_mut() {
-                    let mean = own.iter().map(|of| column[*of]).sum::<f64>() / count;
-                    own.iter().for_each(|of| column[*of] -= mean);
-                }
+    /// Takes out what the unknown pose of each point or plane does to its readings, where `targets` are the targets in its frame, m.
+    fn about_features(&self, targets: &[Vector3<f64>], residuals: &mut DVector<f64>, jacobian: &mut DMatrix<f64>) {
+        for (of, _) in &self.features {
+            let rows = (0..self.measurements.len()).filter(|row| self.measurements[*row].feature().as_ref() == Some(of));
+            let own: Vec<(usize, usize)> =
+                rows.flat_map(|row| self.equations.of_position(row).map(move |equation| (row, equation))).collect();
+            let by_unknown = DMatrix::from_fn(own.len(), feature::UNKNOWNS, |at, unknown| {
+                let (row, equation) = own[at];
+                self.weights[equation] * feature::derivative(of, &targets[row])[(self.equations.component(equation), unknown)]
+            });
+            // An orthonormal basis of what the unknowns do; what is along it says nothing of the arm.
+            let svd = by_unknown.svd(true, false);
+            let largest = svd.singular_values.max();
+            let Some(basis) = svd.u else {
+                continue;
+            };
+            let seen: Vec<usize> = (0..basis.ncols()).filter(|at| svd.singular_values[*at] > largest * 1e-9).collect();
+            let basis = basis.select_columns(&seen);
+            let without = |values: DVector<f64>| &values - &basis * basis.tr_mul(&values);
+            let left = without(DVector::from_iterator(own.len(), own.iter().map(|(_, equation)| residuals[*equation])));
+            own.iter().zip(left.iter()).for_each(|((_, equation), value)| residuals[*equation] = *value);
+            for mut column in jacobian.column_iter_mut() {
+                let left = without(DVector::from_iterator(own.len(), own.iter().map(|(_, equation)| column[*equation])));
+                own.iter().zip(left.iter()).for_each(|((_, equation), value)| column[*equation] = *value);
             }
         }
     }
@@ -595,9 +611,17 @@ impl Problem for Plain<'_> {
         // Built transposed: each pose then fills consecutive memory.
         let mut transposed = DMatrix::zeros(n, self.equations.len());
         let mut rows = vec![0.0; 6 * n];
+        let mut targets = vec![Vector3::zeros(); self.measurements.len()];
         for (row, measurement) in self.measurements.iter().enumerate() {
             let (axes, origin) = chain.jacobian_into(&measurement.joints, &mut rows, n);
-            let error = difference(measurement, &crate::arm::frames::pose_from_parts(&axes, &origin));
+            let mut predicted = crate::arm::frames::pose_from_parts(&axes, &origin);
+            let known = measurement.feature().and_then(|of| self.features.iter().find(|(known, _)| *known == of));
+            if let Some((_, pose)) = known {
+                into_axes(&mut rows, n, &pose.rotation.to_rotation_matrix().into_inner());
+                predicted = pose.inverse() * predicted;
+                targets[row] = predicted.translation.vector;
+            }
+            let error = difference(measurement, &predicted);
             turn_to_residual(&mut rows[3 * n..], n, &error.fixed_rows::<3>(3).into_owned());
             for equation in self.equations.of(row) {
                 let (component, weight) = (self.equations.component(equation), self.weights[equation]);
@@ -608,7 +632,7 @@ impl Problem for Plain<'_> {
             }
         }
         let mut jacobian = transposed.transpose();
-        self.about_points(&mut residuals, &mut jacobian);
+        self.about_features(&targets, &mut residuals, &mut jacobian);
         Linearised { residuals, jacobian, departures: None }
     }
 

@@ -1,8 +1,10 @@
 //! From measurements to parameters, with what can be known about them.
 
 pub mod alignment;
+mod feature;
 pub mod frames;
 pub mod geometry;
+pub mod known;
 pub mod ladder;
 pub mod least_squares;
 pub mod mistake;

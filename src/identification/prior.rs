@@ -9,6 +9,10 @@ use crate::arm::chain::FrameErrors;
 pub const FRAME_SHIFT: f64 = 5e-3;
 /// One sigma of a joint frame's orientation, rad.
 pub const FRAME_TURN: f64 = 10e-3;
+/// One sigma of what somebody says is free, m: so wide that it hardly binds.
+pub const FREE_SHIFT: f64 = 50e-3;
+/// The same of turns, rad.
+pub const FREE_TURN: f64 = 0.5;
 /// Sigmas of the frames' priors over those of manufacturing that an arm may have: the readings say which.
 pub const SCALES: [f64; 7] = [3.0, 1.0, 0.3, 0.1, 0.03, 0.01, 0.003];
 /// The same of joint zeros, which nobody machines: a marked joint is set by eye, a motor is put in a tooth further.
@@ -34,7 +38,8 @@ impl Sizes {
     pub const NOMINAL: Sizes = Sizes { zeros: 0.0, lengths: 0.0, turns: 0.0 };
 
     fn group(&self, group: usize) -> f64 {
-        [self.zeros, self.lengths, self.turns][group]
+        // What is in no group has the size that somebody said.
+        [self.zeros, self.lengths, self.turns].get(group).copied().unwrap_or(0.0)
     }
 
     fn with(self, group: usize, size: f64) -> Sizes {
@@ -51,8 +56,11 @@ impl Sizes {
     }
 }
 
+/// The group of what the readings choose no size for.
+pub(super) const NO_GROUP: usize = 3;
+
 /// What error number `at` of the frames is about: 0 a zero, 1 a length, 2 a turn.
-fn group(frames: &FrameErrors, at: usize) -> usize {
+pub(super) fn group(frames: &FrameErrors, at: usize) -> usize {
     match at % FrameErrors::PER_FRAME {
         _ if frames.is_zero(at) => 0,
         0..3 => 1,
@@ -75,16 +83,12 @@ pub(super) struct Evidence<'a> {
     /// Which parameters are free.
     pub(super) free: &'a [bool],
     /// Of each parameter that is not, what it is about.
-    pub(super) group: Vec<usize>,
+    pub(super) group: &'a [usize],
     /// Sizes of the fit's prior.
     pub(super) sizes: Sizes,
 }
 
-impl<'a> Evidence<'a> {
-    pub(super) fn groups(frames: &FrameErrors, before: usize, free: &[bool]) -> Vec<usize> {
-        free.iter().enumerate().map(|(column, free)| if *free { 0 } else { group(frames, column - before) }).collect()
-    }
-
+impl Evidence<'_> {
     /// Sizes of which the readings are likeliest, where those of groups that the fit held stay: marginal likelihood to first order, base
     /// and target free, the noise's size unknown. First one size for all, then group by group.
     pub(super) fn likeliest(&self) -> Sizes {
@@ -156,7 +160,7 @@ mod tests {
             equations: rows,
             parameters: &parameters,
             free: &[false; 6],
-            group: group.clone(),
+            group: &group,
             sizes: Sizes::MANUFACTURING,
         };
         let dense = |sizes: Sizes| {

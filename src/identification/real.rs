@@ -1,17 +1,19 @@
 //! The calibration of a real arm, whose frame of measurement and whose target nobody knows: the geometry that a diagnosis fits too
 //! ([`super::geometry`]), told in the parameters of the arm's own description.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
 
 use super::geometry::{FREE, Geometry, Readings};
+use super::known::Known;
 use super::ladder::{Climbed, Freedom, climb};
 use super::least_squares::{FOREIGN_ROBOT, IdentificationError, MAX_STEPS, Plain, Solved, check_joints, conclude};
 use super::outcome::{Identification, JointFrame, LeftOut};
 use super::prior::{FRAME_SHIFT, FRAME_TURN, Sizes};
 use super::{alignment, frames};
+use crate::arm::chain::FrameErrors;
 use crate::arm::{Arm, Quantity};
 use crate::measurement::equations::Equations;
-use crate::measurement::{Measurement, Role, Sensor, Weights};
+use crate::measurement::{Feature, Measurement, Role, Sensor, Weights};
 use crate::numerics;
 use crate::numerics::distribution::student_quantile;
 use crate::quality::subspace::{Subspace, late};
@@ -46,6 +48,8 @@ pub struct Wishes<'a> {
     pub only: Option<Freedom>,
     /// Where the joints' zeros are looked for, rad or m; empty for nominal.
     pub zeros: &'a [f64],
+    /// What is known of the arm beforehand.
+    pub known: &'a [Known],
 }
 
 /// Identifies `robot` from `measurements` with [`Role::Fit`] in any frame. How much of the geometry is let loose is what predicts readings
@@ -98,7 +102,7 @@ fn identify_with(
     if far.is_empty() {
         return tell(robot, sensor, measurements, wishes, climbed, Vec::new());
     }
-    let geometry = climbed.geometry.clone().with_points_of(measurements);
+    let geometry = climbed.geometry.clone().with_features_of(measurements);
     let off = |row: &usize| {
         let of = &measurements[*row];
         (*row, super::least_squares::difference(of, &geometry.predict(of)).fixed_rows::<3>(0).norm())
@@ -118,6 +122,7 @@ fn identify_with(
     let left_out = far.iter().map(|(row, off)| LeftOut { index: measurements[*row].index, off_m: *off }).collect();
     let mut notes = vec![note];
     notes.extend(exchanged(measurements, &far, &climbed.geometry, sensor));
+    notes.extend(elsewhere(measurements, &far, &climbed.geometry));
     match tell(robot, sensor, &good, wishes, climbed, notes) {
         Ok(told) => Ok(Identification { left_out, ..told }),
         // Where the rest does not tell an arm, all readings have to.
@@ -147,15 +152,76 @@ fn exchanged(measurements: &[Measurement], far: &[(usize, f64)], geometry: &Geom
         (away(nearest) < near).then(|| format!("reading {} carries the pose of number {}", row + 1, nearest + 1))
     };
     let said: Vec<String> =
-        far.iter().filter(|(row, _)| measurements[*row].fixed_point.is_none()).filter_map(of_another).take(FAR_SAID).collect();
+        far.iter().filter(|(row, _)| measurements[*row].is_in_frame()).filter_map(of_another).take(FAR_SAID).collect();
     if said.is_empty() { Vec::new() } else { vec![format!("{}: were rows exchanged, or a pose written twice?", said.join(", "))] }
+}
+
+/// Readings that are far off alike, of which it is said that they are.
+const ALIKE: usize = 4;
+/// They are alike where their offsets differ by no more than this share of them, root mean square.
+const SPREAD_OF_ALIKE: f64 = 0.05;
+
+/// Readings that are far off by the same shift of the target on the tool, or in the measurement frame: another tool, or a base or a sensor
+/// that was moved.
+fn elsewhere(measurements: &[Measurement], far: &[(usize, f64)], geometry: &Geometry) -> Option<String> {
+    let offsets: Vec<(usize, Vector3<f64>, Vector3<f64>)> = far
+        .iter()
+        .filter(|(row, _)| measurements[*row].is_in_frame() && measurements[*row].unread == [false; 3])
+        .map(|(row, _)| {
+            let predicted = geometry.predict(&measurements[*row]);
+            let off = measurements[*row].position().coords - predicted.translation.vector;
+            (*row, predicted.rotation.inverse() * off, off)
+        })
+        .collect();
+    // About the median of each coordinate, those that are near it.
+    let alike = |of: &dyn Fn(usize) -> Vector3<f64>| -> (Vec<usize>, Vector3<f64>) {
+        let median = |axis: usize| {
+            let mut values: Vec<f64> = (0..offsets.len()).map(|at| of(at)[axis]).collect();
+            values.sort_by(f64::total_cmp);
+            values.get(values.len() / 2).copied().unwrap_or(0.0)
+        };
+        let middle = Vector3::new(median(0), median(1), median(2));
+        let near = |at: &usize| (of(*at) - middle).norm() < SPREAD_OF_ALIKE * middle.norm();
+        ((0..offsets.len()).filter(near).map(|at| offsets[at].0 + 1).collect(), middle)
+    };
+    let on_tool = alike(&|at| offsets[at].1);
+    let in_frame = alike(&|at| offsets[at].2);
+    let (is_tool, (rows, by)) = if on_tool.0.len() >= in_frame.0.len() { (true, on_tool) } else { (false, in_frame) };
+    if rows.len() < ALIKE || 2 * rows.len() < far.len() {
+        return None;
+    }
+    let numbers: Vec<String> = rows.iter().take(FAR_SAID).map(usize::to_string).collect();
+    let more = if rows.len() > FAR_SAID { format!(" and {} more", rows.len() - FAR_SAID) } else { String::new() };
+    let (what, remedy) = if is_tool {
+        ("on the tool", "was it another tool or target? A column `target` with a label for each fits them all")
+    } else {
+        (
+            "in the measurement frame",
+            "was the base or the sensor moved? A column `session` with a label for each set-up fits them all",
+        )
+    };
+    Some(format!(
+        "readings {}{more} are off alike, by {:.1} mm ({:.1}, {:.1}, {:.1}) {what}: {remedy}",
+        numbers.join(", "),
+        by.norm() * 1e3,
+        by.x * 1e3,
+        by.y * 1e3,
+        by.z * 1e3
+    ))
 }
 
 fn climb_with(robot: &Arm, sensor: &Sensor, rows: &[Measurement], wishes: Wishes<'_>) -> Result<Climbed, IdentificationError> {
     let fit: Vec<&Measurement> = rows.iter().filter(|row| row.role == Role::Fit).collect();
     let weights = vec![1.0; fit.len()];
-    let readings =
-        Readings { sensor, measurements: &fit, weights: &weights, displacement: &[], scatter: &[], zeros: wishes.zeros };
+    let readings = Readings {
+        sensor,
+        measurements: &fit,
+        weights: &weights,
+        displacement: &[],
+        scatter: &[],
+        zeros: wishes.zeros,
+        known: wishes.known,
+    };
     Ok(climb(robot, readings, wishes.only)?)
 }
 
@@ -215,7 +281,7 @@ fn far_off(
 ) -> Vec<usize> {
     let all: Vec<&Measurement> = measurements.iter().collect();
     let equations = Equations::new(sensor, &all);
-    let known = geometry.clone().with_points_of(measurements);
+    let known = geometry.clone().with_features_of(measurements);
     let of_prediction = |row: usize| -> DVector<f64> {
         let left = super::least_squares::difference(all[row], &known.predict(all[row]));
         let of = equations.of(row);
@@ -260,16 +326,18 @@ fn tell(
     let fit: Vec<&Measurement> = measurements.iter().filter(|row| row.role == Role::Fit).collect();
     let Climbed { geometry, rungs } = climbed;
     let weights = vec![1.0; fit.len()];
-    let readings = Readings { sensor, measurements: &fit, weights: &weights, displacement: &[], scatter: &[], zeros: &[] };
-    let nominal = geometry.refit(robot, readings, Sizes::NOMINAL)?.with_points_of(measurements);
-    let geometry = geometry.with_points_of(measurements);
+    let readings =
+        Readings { sensor, measurements: &fit, weights: &weights, displacement: &[], scatter: &[], zeros: &[], known: &[] };
+    let nominal = geometry.refit(robot, readings, Sizes::NOMINAL)?.with_features_of(measurements);
+    let geometry = geometry.with_features_of(measurements);
     let aligned = &alignment::placed(robot, &nominal);
     let problem = Plain::new(aligned, sensor, Weights::Noise, &fit)?;
-    let points = fit.iter().filter_map(|row| row.fixed_point.as_ref()).collect::<std::collections::BTreeSet<_>>().len();
-    let structure = if points == 0 {
+    let problem = problem.with_features(&geometry);
+    let features = fit.iter().filter_map(|row| row.feature()).collect::<std::collections::BTreeSet<_>>().len();
+    let structure = if features == 0 {
         Subspace::of_components(aligned, problem.equations().components())
     } else {
-        // What a ball in a socket tells is no component of a pose.
+        // What a ball in a socket or a touched plane tells is no component of a pose.
         let nominal_chain = aligned.chain.nominal();
         Subspace::reveal(&problem.linearise(&nominal_chain).jacobian, &late(aligned), 0.0, usize::MAX)
     };
@@ -330,10 +398,15 @@ fn tell(
             hardly.join(", ")
         ));
     }
-    if points > 0 {
+    if features > 0 {
         let known = sensor.distances.len();
+        let planes = geometry.features.iter().filter(|of| matches!(of, Feature::Plane(_))).count();
+        let of = |count: usize, what: &str| (count > 0).then(|| format!("{count} {what}{}", if count == 1 { "" } else { "s" }));
+        let both = [of(features - planes, "fixed point"), of(planes, "plane")];
         notes.push(format!(
-            "{points} fixed points: errors are the distances of the readings of a point from where the arm has it{}{}",
+            "{}: errors are the distances of the readings from where the arm has {}{}{}",
+            both.into_iter().flatten().collect::<Vec<_>>().join(" and "),
+            if features == 1 { "it" } else { "them" },
             if geometry.is_placed() {
                 ""
             } else {
@@ -352,7 +425,7 @@ fn tell(
         .filter(|(_, read)| !read)
         .map(|(name, _)| name)
         .collect();
-    if !unread.is_empty() {
+    if !unread.is_empty() && geometry.is_placed() {
         notes.push(format!(
             "{} was never read: where the arm stands along it is not known, and held at where it was taken to be",
             unread.join(", ")
@@ -371,7 +444,7 @@ fn tell(
             nominal: &at_nominal,
             predict: &predict,
             errors,
-            degrees_of_freedom: problem.equations().len().saturating_sub(seen + 3 * points),
+            degrees_of_freedom: problem.equations().len().saturating_sub(seen + 3 * features),
             subspace,
             covariance,
             converged: geometry.stop == crate::solver::Stop::Converged,
@@ -433,8 +506,14 @@ fn off_zero(joints: &[JointFrame]) -> Vec<String> {
 fn expressed(aligned: &Arm, sensor: &Sensor, structure: &Subspace, geometry: &Geometry, fit: &[&Measurement]) -> (Vec<f64>, f64) {
     let mut stream = stream(0, "identification/expressed");
     let limits = &aligned.chain.joints;
-    let first =
-        Measurement { session: Some(geometry.sessions[0].clone()), target: Some(geometry.targets[0].clone()), ..fit[0].clone() };
+    let first = Measurement {
+        session: Some(geometry.sessions[0].clone()),
+        target: Some(geometry.targets[0].clone()),
+        fixed_point: None,
+        plane: None,
+        unread: [false; 3],
+        ..fit[0].clone()
+    };
     let drawn = (0..SAMPLES).map(|_| limits.iter().map(|joint| stream.uniform(joint.lower, joint.upper)).collect::<Vec<f64>>());
     let perfect: Vec<Measurement> = fit
         .iter()
@@ -468,10 +547,20 @@ fn expressed(aligned: &Arm, sensor: &Sensor, structure: &Subspace, geometry: &Ge
 fn prior(aligned: &Arm, subspace: &Subspace, geometry: &Geometry) -> (DMatrix<f64>, Vec<Option<f64>>) {
     let parameters = &aligned.chain.parameters;
     let sizes = geometry.sizes();
+    // Of a URDF's joints, six parameters each, the largest that was said of such an error of the frame.
+    let by_joint = parameters.len() == FrameErrors::PER_FRAME * (aligned.joint_count() + 3);
+    let largest = |column: usize| {
+        let frame = (column / FrameErrors::PER_FRAME).checked_sub(2)?;
+        let turns = parameters[column].quantity == Quantity::Angle;
+        let own = (0..FrameErrors::PER_FRAME).filter(|at| (*at >= 3) == turns).map(|at| FrameErrors::PER_FRAME * frame + at);
+        let known = own.filter(|at| *at < FrameErrors::PER_FRAME * geometry.frames().frames());
+        known.map(|at| geometry.sigma_of_frame_error(at)).reduce(f64::max).filter(|_| by_joint)
+    };
     // Base and target come first and last ([`crate::arm::Chain::in_measurement_frame`]).
     let free = |column: usize| column < 6 || column + 6 >= parameters.len();
     let sigma = |column: usize| match parameters[column].quantity {
         _ if free(column) => FREE,
+        _ if largest(column).is_some() => largest(column).unwrap_or(0.0).max(LEAST_SIZE * FRAME_SHIFT),
         Quantity::Length => sizes.lengths.max(LEAST_SIZE) * FRAME_SHIFT,
         Quantity::Angle => sizes.zeros.max(sizes.turns).max(LEAST_SIZE) * FRAME_TURN,
     };

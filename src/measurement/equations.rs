@@ -7,6 +7,8 @@
 
 use std::ops::Range;
 
+use nalgebra::{Matrix3, Vector3};
+
 use super::{Measurement, Sensor};
 
 /// Components of a pose: x, y, z of the origin (m), then the rotation vector (rad).
@@ -21,6 +23,8 @@ pub struct Equations {
     component: Vec<usize>,
     /// Declared sigma of each, m or rad.
     sigma: Vec<f64>,
+    /// Axes, in the measurement frame, along which the components of readings are that are not along that frame's own; empty for none.
+    axes: Vec<Option<Matrix3<f64>>>,
 }
 
 impl Equations {
@@ -30,7 +34,7 @@ impl Equations {
     pub fn new(sensor: &Sensor, measurements: &[&Measurement]) -> Equations {
         let orientation_sigma =
             sensor.orientation_sigma_rad.filter(|_| measurements.iter().all(|row| row.orientation_xyzw.is_some()));
-        let mut equations = Equations { first: vec![0], component: Vec::new(), sigma: Vec::new() };
+        let mut equations = Equations { first: vec![0], component: Vec::new(), sigma: Vec::new(), axes: Vec::new() };
         for row in measurements {
             let position_sigma = sensor.position_sigma_at(&row.position().coords);
             for component in 0..COMPONENTS {
@@ -109,6 +113,10 @@ impl Equations {
 
     /// What the equations of reading `row` say of `pose`, a small change of its pose: m and rad in the measurement frame.
     pub fn pick(&self, row: usize, pose: [f64; COMPONENTS]) -> impl Iterator<Item = f64> {
+        let pose = match self.axes_of(row) {
+            Some(axes) => turned(pose, |part| axes.tr_mul(&part)),
+            None => pose,
+        };
         self.component[self.of(row)].iter().map(move |component| pose[*component])
     }
 
@@ -119,13 +127,25 @@ impl Equations {
         for (component, value) in self.component[self.of(row)].iter().zip(values) {
             pose[*component] = *value;
         }
-        pose
+        match self.axes_of(row) {
+            Some(axes) => turned(pose, |part| axes * part),
+            None => pose,
+        }
+    }
+
+    /// With the components of each reading along these axes of the measurement frame (columns); along its own where there are none.
+    pub fn set_axes(&mut self, axes: Vec<Option<Matrix3<f64>>>) {
+        self.axes = axes;
+    }
+
+    fn axes_of(&self, row: usize) -> Option<&Matrix3<f64>> {
+        self.axes.get(row)?.as_ref()
     }
 
     /// The equations about positions alone, and of each its number among all.
     #[must_use]
     pub fn positions(&self) -> (Equations, Vec<usize>) {
-        let mut equations = Equations { first: vec![0], component: Vec::new(), sigma: Vec::new() };
+        let mut equations = Equations { first: vec![0], component: Vec::new(), sigma: Vec::new(), axes: Vec::new() };
         let mut which = Vec::new();
         for row in 0..self.readings() {
             for equation in self.of_position(row) {
@@ -135,8 +155,15 @@ impl Equations {
             }
             equations.first.push(equations.component.len());
         }
+        equations.axes.clone_from(&self.axes);
         (equations, which)
     }
+}
+
+/// Both halves of a small change of a pose, each turned by `turn`.
+fn turned([x, y, z, rx, ry, rz]: [f64; COMPONENTS], turn: impl Fn(Vector3<f64>) -> Vector3<f64>) -> [f64; COMPONENTS] {
+    let (shift, rotation) = (turn(Vector3::new(x, y, z)), turn(Vector3::new(rx, ry, rz)));
+    [shift.x, shift.y, shift.z, rotation.x, rotation.y, rotation.z]
 }
 
 #[cfg(test)]

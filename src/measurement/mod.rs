@@ -46,6 +46,9 @@ pub struct Measurement {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[serde(rename = "attitude_xyzw")]
     pub orientation_xyzw: Option<[f64; 4]>,
+    /// The three angles that the orientation was read as, rad, where it was: what other ways of taking them are tried on. Not recorded.
+    #[serde(skip)]
+    pub angles_rad: Option<[f64; 3]>,
     /// Direction of each joint's last move before the reading: -1, 0 (it did not move) or 1; empty where not recorded.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub approach: Vec<i8>,
@@ -68,6 +71,10 @@ pub struct Measurement {
     /// was read, and zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fixed_point: Option<String>,
+    /// A plane that does not move in the measurement frame and of which nobody knows where it is, on which the target was. The position is
+    /// then none that was read, and zero; of `unread` only z is not, which is the distance from the plane.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plane: Option<String>,
     /// Which reflector on the tool was read, where there are several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<String>,
@@ -77,7 +84,29 @@ fn all_read(unread: &[bool; 3]) -> bool {
     *unread == [false; 3]
 }
 
+/// What does not move in the measurement frame and of which nobody knows where it is, by its label; the target was there.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Feature {
+    /// At a point: a ball in a socket.
+    Point(String),
+    /// On a plane: a tip that touches a surface plate.
+    Plane(String),
+}
+
 impl Measurement {
+    /// Where the target was, if that was not read but is known to be the same in other readings.
+    #[must_use]
+    pub fn feature(&self) -> Option<Feature> {
+        let point = self.fixed_point.clone().map(Feature::Point);
+        point.or_else(|| self.plane.clone().map(Feature::Plane))
+    }
+
+    /// Whether a position in the measurement frame was read.
+    #[must_use]
+    pub fn is_in_frame(&self) -> bool {
+        self.fixed_point.is_none() && self.plane.is_none()
+    }
+
     /// The measured origin of the tool.
     #[must_use]
     pub fn position(&self) -> Point3<f64> {

@@ -56,7 +56,7 @@ fn arm() -> Arm {
         })
         .collect();
     let joints = (1..=JOINTS)
-        .map(|joint| Joint { name: format!("joint{joint}"), kind: JointKind::Revolute, lower: -3.0, upper: 3.0 })
+        .map(|joint| Joint { name: format!("joint{joint}"), kind: JointKind::Revolute, lower: -3.0, upper: 3.0, mimic: None })
         .collect();
     let shape = |geometry| Shape { link_from_shape: Pose::translation(0.1, 0.0, 0.05), geometry };
     let link = |name: String, geometry| Link { name, inertial: None, shapes: vec![shape(geometry)] };
@@ -107,6 +107,7 @@ fn events(size: &Size) -> Vec<Event> {
             scene: "name = \"synthetic\"\nseed = 11 # ünïcode, \"quotes\"\n".to_owned(),
             poses: Some(19),
             real: Some(RealCell {
+                known: Vec::new(),
                 only: None,
                 zeros: Vec::new(),
                 distances: Vec::new(),
@@ -162,7 +163,9 @@ fn events(size: &Size) -> Vec<Event> {
     for (index, joints) in configurations(&mut stream, size.measurements).into_iter().enumerate() {
         let pose = chain.forward(&joints);
         events.push(Event::Measured(Measurement {
+            angles_rad: None,
             fixed_point: None,
+            plane: None,
             gravity_m_s2: Some([0.0, 0.0, -9.81]),
             index,
             pose_id: index,
@@ -1012,7 +1015,9 @@ fn a_measurement_without_conditions_reads_as_without() {
         gravity_m_s2: Some([0.0, 0.0, -9.81]),
         session: Some("1".to_owned()),
         target: Some("A".to_owned()),
+        angles_rad: None,
         fixed_point: Some("socket".to_owned()),
+        plane: None,
         unread: [false, false, true],
         ..expected
     };

@@ -321,7 +321,7 @@ fn joint(file: &JointToml, key: &str) -> Checked<Joint> {
         JointKind::Revolute => f64::to_radians,
         JointKind::Prismatic => metres_from_mm,
     };
-    Ok(Joint { name: file.name.clone(), kind, lower: convert(lower), upper: convert(upper) })
+    Ok(Joint { name: file.name.clone(), kind, lower: convert(lower), upper: convert(upper), mimic: None })
 }
 
 fn link(file: Option<&LinkToml>, name: String, key: &str) -> Checked<Link> {

@@ -83,6 +83,14 @@ pub(super) fn arm(file: &ArmToml) -> Result<Imported, Invalid> {
         return Err(Invalid::new("arm.convention", "neither `urdf_file` nor `urdf`", EITHER, remedy));
     };
     let imported = urdf::import(text, "", file.urdf_base_link.as_deref(), file.urdf_tip_link.as_deref()).map_err(invalid)?;
+    if let Some(joint) = imported.arm.chain.joints.iter().find(|joint| joint.mimic.is_some()) {
+        return Err(Invalid::new(
+            "arm.urdf",
+            format!("joint {:?} mimics another one", joint.name),
+            "joints that move independently: a scene moves each on its own",
+            "remove <mimic> if it is driven on its own, or end the chain before it with urdf_tip_link",
+        ));
+    }
     match too_large(&imported.arm) {
         None => Ok(imported),
         Some((found, largest)) => {

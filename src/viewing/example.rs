@@ -40,7 +40,7 @@ fn arm() -> Arm {
         })
         .collect();
     let joints = (1..=JOINTS)
-        .map(|number| Joint { name: format!("joint{number}"), kind: JointKind::Revolute, lower: -2.0, upper: 2.0 })
+        .map(|number| Joint { name: format!("joint{number}"), kind: JointKind::Revolute, lower: -2.0, upper: 2.0, mimic: None })
         .collect();
     let inertial =
         Inertial { mass_kg: 2.0, centre_of_mass_in_link: Point3::origin(), inertia_in_link: Matrix3::identity() * 1e-2 };

@@ -24,7 +24,7 @@ fn arm() -> Arm {
         })
         .collect();
     let joints = (1..=8)
-        .map(|index| Joint { name: format!("joint{index}"), kind: JointKind::Revolute, lower: -3.0, upper: 3.0 })
+        .map(|index| Joint { name: format!("joint{index}"), kind: JointKind::Revolute, lower: -3.0, upper: 3.0, mimic: None })
         .collect();
     let link = |index: usize| Link {
         name: if index == 0 { "base_link".to_owned() } else { format!("link{index}") },

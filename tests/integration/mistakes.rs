@@ -4,6 +4,7 @@ use kincal::arm::frames::{Pose, rotation_from_vector};
 use kincal::arm::{Arm, urdf};
 use kincal::identification::mistake::{Explanation, Fix, Said, explanations, is_suspicious};
 use kincal::measurement::Measurement;
+use kincal::measurement::table::Euler;
 use kincal::scene;
 use kincal::seed::{Stream, stream};
 use nalgebra::Vector3;
@@ -152,6 +153,7 @@ fn mistake(kind: &str, rows: &mut Vec<Measurement>, arm: &Arm, draws: &mut Strea
         "w first" => vec![Fix::RealPartFirst],
         "conjugate" => vec![Fix::Conjugate],
         "inverse pose" => vec![Fix::Inverse],
+        "angles in another way" => vec![Fix::Angled(Euler::Turns { axes: [0, 1, 2], moving: false })],
         _ => unreachable!("{kind}"),
     };
     // What undoes it, backwards.
@@ -183,6 +185,11 @@ fn mistake(kind: &str, rows: &mut Vec<Measurement>, arm: &Arm, draws: &mut Strea
             Fix::RealPartFirst => rows.iter_mut().for_each(|row| {
                 row.orientation_xyzw = row.orientation_xyzw.map(|[x, y, z, w]| [w, x, y, z]);
             }),
+            Fix::Angled(_) => rows.iter_mut().for_each(|row| {
+                let (roll, pitch, yaw) = row.orientation().unwrap().euler_angles();
+                row.angles_rad = Some([roll, pitch, yaw]);
+                row.orientation_xyzw = row.angles_rad.map(|angles| Euler::Vector.turn(angles).coords.into());
+            }),
             // The rest undo themselves.
             other => other.apply(rows, &said(), &slides).unwrap(),
         }
@@ -192,10 +199,10 @@ fn mistake(kind: &str, rows: &mut Vec<Measurement>, arm: &Arm, draws: &mut Strea
 
 /// Positions are said to be in mm, angles in rad.
 fn said() -> Said {
-    Said { angle: 1.0, position: [1e-3; 3] }
+    Said { angle: 1.0, position: [1e-3; 3], euler: Some(Euler::Vector) }
 }
 
-const KINDS: [(&str, bool); 15] = [
+const KINDS: [(&str, bool); 16] = [
     ("two columns swapped", false),
     ("three columns moved on", false),
     ("one joint reversed", false),
@@ -210,6 +217,7 @@ const KINDS: [(&str, bool); 15] = [
     ("w first", true),
     ("conjugate", true),
     ("inverse pose", true),
+    ("angles in another way", true),
     ("nothing", false),
 ];
 

@@ -11,7 +11,7 @@ use super::rpy::{rotation_from_rpy, z_onto};
 use super::{UrdfError, UrdfProblem};
 use crate::arm::frames::Pose;
 use crate::arm::{Arm, Geometry, Inertial, Link, Shape};
-use crate::arm::{Chain, Joint, JointKind, Step};
+use crate::arm::{Chain, Joint, JointKind, Mimic, Step};
 
 /// Radius of the ball whose inertia a link gets that has an impossible one, m.
 const BALL_M: f64 = 0.05;
@@ -47,15 +47,54 @@ pub fn read(path: &Path, base_link: Option<&str>, tip_link: Option<&str>) -> Res
 /// frozen at zero.
 ///
 /// # Errors
-/// If the text is no URDF, or the chain has joints other than revolute, continuous, prismatic and fixed, joints that mimic, or
-/// no limits, or if the links do not form a tree from base to tip. The message names the joint or link, the line and a remedy.
+/// If the text is no URDF, or the chain has joints other than revolute, continuous, prismatic and fixed, joints that mimic one beside the
+/// chain, or if the links do not form a tree from base to tip. The message names the joint or link, the line and a remedy.
 pub fn import(text: &str, origin: &str, base_link: Option<&str>, tip_link: Option<&str>) -> Result<Imported, UrdfError> {
     let outline = outline(text);
+    foreign(text, origin)?;
     let source = Source { text, origin, elements: outline.as_ref().map_or(&[], |outline| outline.elements.as_slice()) };
     let robot = urdf_rs::read_from_string(text).map_err(|error| source.parse_error(&error, &outline))?;
     let tree = Tree::of(&source, &robot)?;
     let (base, path) = tree.path(base_link, tip_link)?;
     Build::new(&tree, base, &path).run()
+}
+
+/// Refuses other descriptions of robots, by their names, with what makes a URDF of them.
+fn foreign(text: &str, origin: &str) -> Result<(), UrdfError> {
+    let root =
+        text.match_indices('<').map(|(at, _)| &text[at + 1..]).find(|rest| rest.starts_with(|c: char| c.is_ascii_alphabetic()));
+    let tag = root.unwrap_or_default().split(|c: char| !c.is_ascii_alphanumeric()).next().unwrap_or_default();
+    let begins = text.trim_start();
+    let (found, remedy) = match tag {
+        "mujoco" | "mujocoinclude" => (
+            "an MJCF model (MuJoCo)",
+            "convert it: pip install mjcf-urdf-simple-converter, then python -c 'from mjcf_urdf_simple_converter import convert; \
+             convert(\"robot.xml\", \"robot.urdf\")'",
+        ),
+        "sdf" | "gazebo" => (
+            "an SDF model (Gazebo)",
+            "give the URDF or xacro that it was made of; if there is none, write one, joint by joint: only origins, axes and limits are needed",
+        ),
+        "COLLADA" => ("a COLLADA mesh", "give the URDF that uses it"),
+        "robot" if text.contains("<xacro:") || text.contains("${") => {
+            ("a xacro", "expand it: pip install xacro, then xacro robot.urdf.xacro > robot.urdf")
+        }
+        "" if begins.starts_with("#usda") || begins.starts_with("PXR-USDC") => {
+            ("a USD stage (Isaac Sim)", "export a URDF: in Isaac Sim, File > Export to URDF")
+        }
+        "" if begins.starts_with('{') => ("JSON", "give the robot as a URDF"),
+        "" => ("no XML", "give the robot as a URDF; a xacro is expanded with: xacro robot.urdf.xacro > robot.urdf"),
+        _ => return Ok(()),
+    };
+    let line = root.map(|root| line_of(text, text.len() - root.len()));
+    Err(UrdfError::Invalid(Box::new(UrdfProblem {
+        origin: origin.to_owned(),
+        line,
+        element: String::new(),
+        found: found.to_owned(),
+        allowed: "URDF: <robot> with <link>s and <joint>s".to_owned(),
+        remedy: remedy.to_owned(),
+    })))
 }
 
 struct Source<'a> {
@@ -412,14 +451,25 @@ impl<'a> Build<'a> {
     fn moving(&mut self, joint: &urdf_rs::Joint) -> Result<(Joint, Vector3<f64>), UrdfError> {
         let source = self.tree.source;
         let name = &joint.name;
-        if let Some(mimic) = &joint.mimic {
-            return Err(source.joint_error(
-                name,
-                format!("a joint in the chain that mimics {:?}", mimic.joint),
-                "joints that move independently",
-                "end the chain before it with --tip-link, or remove <mimic> if it is driven on its own",
-            ));
-        }
+        let mimic = match &joint.mimic {
+            None => None,
+            Some(of) => {
+                let moving = |joint: &&&urdf_rs::Joint| joint.joint_type != JointType::Fixed;
+                let place = self.path.iter().filter(moving).position(|joint| joint.name == of.joint);
+                let Some(source) = place.filter(|_| of.joint != *name) else {
+                    return Err(source.joint_error(
+                        name,
+                        format!("a joint in the chain that mimics {:?}, which is not in the chain", of.joint),
+                        "joints that move independently, or with another one of the chain",
+                        "end the chain before it with --tip-link, or remove <mimic> if it is driven on its own",
+                    ));
+                };
+                let (multiplier, offset) = (of.multiplier.unwrap_or(1.0), of.offset.unwrap_or(0.0));
+                self.notes
+                    .push(format!("joint {name} is driven by {}: {multiplier} times its coordinate, plus {offset}", of.joint));
+                Some(Mimic { joint: source, multiplier, offset })
+            }
+        };
         let kind = match joint.joint_type {
             JointType::Revolute | JointType::Continuous => JointKind::Revolute,
             JointType::Prismatic => JointKind::Prismatic,
@@ -442,16 +492,20 @@ impl<'a> Build<'a> {
             (joint.limit.lower, joint.limit.upper)
         };
         let unit = if kind == JointKind::Revolute { "rad" } else { "m" };
-        if lower == 0.0 && upper == 0.0 {
-            let remedy = format!("add <limit lower=\"…\" upper=\"…\" effort=\"…\" velocity=\"…\"/> ({unit})");
-            return Err(source.joint_error(name, "no limits", "lower and upper: configurations are drawn between them", remedy));
-        }
+        let (lower, upper) = if lower == 0.0 && upper == 0.0 {
+            let (reach, said) = if kind == JointKind::Revolute { (std::f64::consts::PI, "±180°") } else { (1.0, "±1 m") };
+            self.notes
+                .push(format!("joint {name} has no limits: {said} is taken; a measured table does not need them, a design does"));
+            (-reach, reach)
+        } else {
+            (lower, upper)
+        };
         if !(lower.is_finite() && upper.is_finite() && lower < upper) {
             let found = format!("limits from {lower} to {upper} {unit}");
             return Err(source.joint_error(name, found, "finite limits, the lower one below the upper", "correct the <limit>"));
         }
         // Dividing by a length of one changes nothing, so (0, 0, 1) stays exact.
-        Ok((Joint { name: name.clone(), kind, lower, upper }, axis / length))
+        Ok((Joint { name: name.clone(), kind, lower, upper, mimic }, axis / length))
     }
 
     /// Adds a URDF link to the last rigid link, and with it what hangs on it beside the chain.

@@ -212,7 +212,7 @@ fn any_axis_and_any_place_of_fixed_joints_keep_the_poses_of_the_file() {
 #[test]
 fn a_chain_with_any_steps_between_frames_is_exported() {
     use crate::arm::{Axis, Chain, Joint, Step};
-    let joint = |name: &str, kind| Joint { name: name.to_owned(), kind, lower: -1.0, upper: 1.0 };
+    let joint = |name: &str, kind| Joint { name: name.to_owned(), kind, lower: -1.0, upper: 1.0, mimic: None };
     let mut chain = Chain::new();
     chain.frame("base");
     chain.rotate(Axis::X, "r1", 0.3);
@@ -287,7 +287,6 @@ fn what_is_wrong_is_named_with_line_element_and_remedy() {
             &["robot.urdf:10: joint \"shoulder\"", "a floating joint", "revolute, continuous"],
         ),
         ("type=\"continuous\"", "type=\"planar\"", &["a planar joint"]),
-        ("type=\"continuous\"", "type=\"revolute\"", &["robot.urdf:10: joint \"shoulder\"", "no limits", "add <limit lower"]),
         (
             "lower=\"-1\" upper=\"2\"",
             "lower=\"2\" upper=\"-1\"",
@@ -306,8 +305,8 @@ fn what_is_wrong_is_named_with_line_element_and_remedy() {
         ),
         (
             "<axis xyz=\"0 0 -1\"/>",
-            "<axis xyz=\"0 0 -1\"/><mimic joint=\"slide\"/>",
-            &["joint \"down\"", "mimics \"slide\"", "remove <mimic>"],
+            "<axis xyz=\"0 0 -1\"/><mimic joint=\"grip\"/>",
+            &["joint \"down\"", "mimics \"grip\", which is not in the chain", "remove <mimic>"],
         ),
         ("<mass value=\"2\"/>", "<mass value=\"-2\"/>", &["robot.urdf:6: link \"a\"", "mass -2 kg", "correct the <inertial>"]),
     ];
@@ -327,7 +326,27 @@ fn what_is_wrong_is_named_with_line_element_and_remedy() {
     let only_a_link = import("<robot name=\"r\"><link name=\"l\"/></robot>", "r.urdf", None, None).expect_err("no joints");
     assert!(only_a_link.to_string().contains("no joints"), "{only_a_link}");
     let xacro = import("<robot name=\"r\"><xacro:include filename=\"x\"/></robot>", "r.urdf", None, None).expect_err("xacro");
-    assert!(xacro.to_string().contains("expand the xacro first"), "{xacro}");
+    assert!(
+        xacro.to_string().contains("r.urdf:1: (robot)") && xacro.to_string().contains("xacro robot.urdf.xacro > robot.urdf"),
+        "{xacro}"
+    );
+    for (text, found, remedy) in [
+        ("<?xml version=\"1.0\"?>\n<mujoco model=\"m\"/>", "an MJCF model", "mjcf_urdf_simple_converter"),
+        ("<sdf version=\"1.7\"><model name=\"m\"/></sdf>", "an SDF model", "the URDF or xacro that it was made of"),
+        ("#usda 1.0\n", "a USD stage", "Export to URDF"),
+        ("{\"a\": 1}", "JSON", "URDF"),
+        ("solid part", "no XML", "URDF"),
+    ] {
+        let error = import(text, "robot.xml", None, None).expect_err("refused").to_string();
+        assert!(error.contains(found) && error.contains(remedy), "{error}");
+    }
+    let free = ODD.replacen("type=\"continuous\"", "type=\"revolute\"", 1);
+    let imported = import(&free, "robot.urdf", None, Some("probe")).unwrap();
+    assert!(
+        imported.notes.iter().any(|note| note.contains("joint shoulder has no limits: ±180° is taken")),
+        "{:?}",
+        imported.notes
+    );
     for text in ["", "not XML", "<robot", "<sdf><model/></sdf>"] {
         let error = import(text, "r.urdf", None, None).expect_err("not a URDF").to_string();
         println!("{error}");

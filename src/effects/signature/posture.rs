@@ -101,6 +101,12 @@ impl Mechanism {
         self.posture_moved(joints, payload_kg, &self.gravity, &[])
     }
 
+    /// From root to tool.
+    #[must_use]
+    pub fn chain(&self) -> &ChainAt {
+        &self.chain
+    }
+
     /// The same where rigid motions (in root) move what is outboard: `motions[0]` the whole arm, `motions[i]` what moves with joint `i`
     /// (from 1) and beyond. None that is missing moves anything. `gravity` in root, m/s².
     #[must_use]

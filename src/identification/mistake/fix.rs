@@ -6,6 +6,7 @@ use std::str::FromStr;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 use crate::measurement::Measurement;
+use crate::measurement::table::Euler;
 use crate::units::{ANGLES, LENGTHS, unit_named};
 
 /// A correction of a table. Joints and readings count from 0 here, from 1 in words.
@@ -44,6 +45,8 @@ pub enum Fix {
     RealPartFirst,
     /// Quaternions turn the other way.
     Conjugate,
+    /// Three angles make an orientation in this way.
+    Angled(Euler),
     /// From this reading on, poses belong to the joints so many rows further down.
     Shift(usize, isize),
     /// These readings are to be left out.
@@ -57,11 +60,13 @@ pub struct Said {
     pub angle: f64,
     /// Of positions.
     pub position: [f64; 3],
+    /// How three angles were taken to make orientations; absent where there are none.
+    pub euler: Option<Euler>,
 }
 
 impl Default for Said {
     fn default() -> Self {
-        Said { angle: 1.0, position: [1.0; 3] }
+        Said { angle: 1.0, position: [1.0; 3], euler: None }
     }
 }
 
@@ -167,6 +172,12 @@ impl Fix {
                     row.orientation_xyzw = row.orientation_xyzw.map(|[x, y, z, w]| [-x, -y, -z, w]);
                 }
             }
+            Fix::Angled(euler) => {
+                for row in rows {
+                    let angles = row.angles_rad.ok_or("the table has no three angles that make an orientation")?;
+                    row.orientation_xyzw = Some(euler.turn(angles).coords.into());
+                }
+            }
             Fix::Shift(first, by) => {
                 if *first >= rows.len() || by.unsigned_abs() >= rows.len() || *by == 0 {
                     return Err(format!("there are {} readings", rows.len()));
@@ -181,6 +192,7 @@ impl Fix {
                         position_m: pose.position_m,
                         unread: pose.unread,
                         orientation_xyzw: pose.orientation_xyzw,
+                        angles_rad: pose.angles_rad,
                         ..read[from].clone()
                     })
                 });
@@ -244,6 +256,14 @@ impl Fix {
             }
             Fix::RealPartFirst => "the quaternions stand in the order w, x, y, z".to_owned(),
             Fix::Conjugate => "the quaternions are conjugate: they turn the other way".to_owned(),
+            Fix::Angled(Euler::Vector) => "the three angles are a rotation vector (axis times angle)".to_owned(),
+            Fix::Angled(euler) => {
+                let named = match euler {
+                    Euler::Turns { axes: [0, 1, 2], moving: false } => " (roll, pitch, yaw; KUKA's A, B, C; FANUC's W, P, R)",
+                    _ => "",
+                };
+                format!("the three angles are turns about fixed axes in the order {euler}{named}")
+            }
             Fix::Shift(first, by) => format!(
                 "from reading {} on, joints stand beside the pose of {} {} {}",
                 first + 1,
@@ -298,6 +318,7 @@ impl fmt::Display for Fix {
             Fix::Inverse => f.write_str("pose:inverse"),
             Fix::RealPartFirst => f.write_str("quaternion:wxyz"),
             Fix::Conjugate => f.write_str("quaternion:conjugate"),
+            Fix::Angled(euler) => write!(f, "euler:{euler}"),
             Fix::Shift(first, by) => write!(f, "shift:{}={by:+}", first + 1),
             Fix::Drop(readings) => write!(f, "drop:{}", list(readings)),
         }
@@ -307,7 +328,7 @@ impl fmt::Display for Fix {
 /// What can be written.
 pub const GRAMMAR: &str = "order:1,2,4,5,3,6 (which joint each column holds), reverse:2,5, couple:3+2 (column 3 holds joint 3 plus joint 2), \
                            factor:4=0.5, zero:3=90 (degrees to be added), angles:deg, positions:inch, positions:39.37 (a factor), z:cm, axes:x,-y,z, pose:inverse, \
-                           quaternion:wxyz, quaternion:conjugate, shift:31=+2 (from reading 31 on, a pose belongs to the joints two rows \
+                           quaternion:wxyz, quaternion:conjugate, euler:xyz (or rotvec …), shift:31=+2 (from reading 31 on, a pose belongs to the joints two rows \
                            further down), drop:5,17";
 
 impl FromStr for Fix {
@@ -325,6 +346,7 @@ impl FromStr for Fix {
         Ok(match what {
             "order" => Fix::Order(list()?),
             "reverse" => Fix::Reverse(list()?),
+            "euler" => Fix::Angled(how.parse().map_err(|_| wrong())?),
             "couple" => {
                 let at = how.find(['+', '-']).ok_or_else(wrong)?;
                 let sign = if how.as_bytes()[at] == b'+' { 1.0 } else { -1.0 };
@@ -444,7 +466,10 @@ mod tests {
             })
             .collect();
         let fixed = |text: &str, mut rows: Vec<Measurement>| {
-            text.parse::<Fix>().unwrap().apply(&mut rows, &Said { angle: 1.0, position: [1e-3; 3] }, &[false; 3]).unwrap();
+            text.parse::<Fix>()
+                .unwrap()
+                .apply(&mut rows, &Said { angle: 1.0, position: [1e-3; 3], euler: None }, &[false; 3])
+                .unwrap();
             rows
         };
         let mut wrong = rows.clone();

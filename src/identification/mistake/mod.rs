@@ -7,6 +7,7 @@
 //! be off, and is the shortest of its kind.
 
 mod fix;
+mod variant;
 
 pub use fix::{Fix, GRAMMAR, Said};
 
@@ -20,6 +21,7 @@ use super::standing;
 use crate::arm::frames::Pose;
 use crate::arm::{Arm, ChainAt};
 use crate::measurement::Measurement;
+use crate::measurement::table::Euler;
 use crate::units::{ANGLES, LENGTHS};
 
 /// Readings that are looked at, spread over all of them.
@@ -160,7 +162,7 @@ pub fn explanations(arm: &Arm, said: &Said, rows: &[&Measurement]) -> Vec<Explan
 
 /// The readings that have a position; fixed points have none.
 fn in_frame(rows: &[&Measurement]) -> Vec<Measurement> {
-    rows.iter().filter(|row| row.fixed_point.is_none()).map(|row| (*row).clone()).collect()
+    rows.iter().filter(|row| row.is_in_frame()).map(|row| (*row).clone()).collect()
 }
 
 /// Whether the nominal arm, base and target placed, leaves more of `rows` than an arm of this kind may.
@@ -331,6 +333,14 @@ impl Search<'_> {
                 fixes.push(Fix::Axes([(x, 1.0), (y, 1.0), (z, 1.0)]));
             }
             fixes.extend([Fix::Inverse, Fix::RealPartFirst, Fix::Conjugate]);
+            if let Some(said) = self.said.euler {
+                // Order about fixed axes is the other way round about moving ones.
+                let usual = |euler: Euler| match euler {
+                    Euler::Turns { axes: [a, b, c], moving: true } => Euler::Turns { axes: [c, b, a], moving: false },
+                    other => other,
+                };
+                fixes.extend(Euler::all().into_iter().filter(|euler| *euler != usual(said)).map(Fix::Angled));
+            }
         }
         fixes.extend(self.scale(start).map(Fix::Scale));
         let mut tried: Vec<Trial> = fixes.into_par_iter().filter_map(|fix| self.trial(start, fix)).collect();
@@ -504,26 +514,52 @@ fn permutations(count: usize) -> Vec<Vec<usize>> {
     all
 }
 
-/// A sentence about what to look at: what explains the readings, with the options that correct it; and the explanations themselves.
+/// Another robot is named before a mistake that leaves twice as much.
+const FITS_BETTER: f64 = 0.5;
+
+/// What to look at.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hint {
+    /// A sentence: what explains the readings, with the options that correct it.
+    pub text: String,
+    /// Mistakes that explain them.
+    pub explanations: Vec<Explanation>,
+    /// Whether they are those of another robot.
+    pub another_robot: bool,
+}
+
+/// What to look at where `rows` are not those of `arm`.
 #[must_use]
-pub fn hint(arm: &Arm, said: &Said, rows: &[&Measurement]) -> (String, Vec<Explanation>) {
+pub fn hint(arm: &Arm, said: &Said, rows: &[&Measurement]) -> Hint {
     let found = explanations(arm, said, rows);
     let clause = |of: &Explanation| {
         format!("{} (the nominal arm is then within {:.1} mm; correct it with {})", of.words(arm), of.left_m * 1e3, of.options())
     };
+    // A robot of the same family in another size is nearly this one with its positions scaled.
+    let nearest = found.iter().map(|of| of.left_m).fold(f64::INFINITY, f64::min);
+    let another = variant::variant(arm, rows).filter(|variant| variant.left_m < FITS_BETTER * nearest);
+    if let Some(variant) = another {
+        let text = format!(
+            "They are those of another robot, {}: with its maker's dimensions it is within {:.1} mm of them. Give its file with --robot",
+            variant.name,
+            variant.left_m * 1e3
+        );
+        return Hint { text, explanations: Vec::new(), another_robot: true };
+    }
+    let of = |text: String, explanations: Vec<Explanation>| Hint { text, explanations, another_robot: false };
     if !found.is_empty() {
         let clauses: Vec<String> = found.iter().map(clause).collect();
-        return (format!("They would fit if {}", clauses.join(", or if ")), found);
+        return of(format!("They would fit if {}", clauses.join(", or if ")), found);
     }
     let still = |joint: &usize| rows.iter().all(|row| row.joints[*joint] == rows[0].joints[*joint]);
     let frozen: Vec<String> =
         (0..arm.joint_count()).filter(still).map(|joint| format!("`{}`", arm.chain.joints[joint].name)).collect();
     if !frozen.is_empty() {
-        return (format!("The readings of joint {} never change: was the arm really still there?", frozen.join(", ")), found);
+        return of(format!("The readings of joint {} never change: was the arm really still there?", frozen.join(", ")), found);
     }
     let nothing = "No other units, order, sense or zero of the joints, no other convention of the poses and no slip of the rows explains \
                    them: is it this robot, and are its links from --base-link to --tip-link?";
-    (nothing.to_owned(), found)
+    of(nothing.to_owned(), found)
 }
 
 #[cfg(test)]

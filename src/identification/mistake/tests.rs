@@ -23,7 +23,8 @@ fn said(change: impl Fn(&mut Measurement)) -> (String, Vec<Explanation>) {
         })
         .collect();
     rows.iter_mut().for_each(change);
-    hint(&arm, &Said { angle: 1.0, position: [1e-3; 3] }, &rows.iter().collect::<Vec<_>>())
+    let found = hint(&arm, &Said { angle: 1.0, position: [1e-3; 3], euler: None }, &rows.iter().collect::<Vec<_>>());
+    (found.text, found.explanations)
 }
 
 fn options(found: &[Explanation]) -> Vec<String> {

@@ -50,6 +50,7 @@ pub(super) enum Column {
     Session,
     Target,
     FixedPoint,
+    Plane,
     Gravity {
         axis: usize,
     },
@@ -58,7 +59,7 @@ pub(super) enum Column {
 }
 
 pub(super) const ALLOWED: &str = "pose_id, time_s, q1_rad… (or _deg, _m, _mm, _ticks), x_m, y_m, z_m (or _mm, _inch …), qx, qy, qz, qw, \
-                                  rx_deg, ry_deg, rz_deg (with --euler), r11 … r33, role, target, fixed_point, approach1…, temp_ambient_c, \
+                                  rx_deg, ry_deg, rz_deg (with --euler), r11 … r33, role, target, fixed_point, plane, approach1…, temp_ambient_c, \
                                   temp1_c…, payload_kg, dwell_s, session, gravity_x, gravity_y, gravity_z; joints may have their names in \
                                   the robot's file, units may stand in brackets";
 
@@ -213,6 +214,7 @@ fn plain(name: &str) -> Option<Column> {
         "role" => Some(Column::Role),
         "target" => Some(Column::Target),
         "fixed_point" => Some(Column::FixedPoint),
+        "plane" => Some(Column::Plane),
         "temp_ambient_c" => Some(Column::Ambient),
         "payload_kg" => Some(Column::Payload),
         "dwell_s" => Some(Column::Dwell),
@@ -302,11 +304,13 @@ impl Header {
         let columns_of =
             |axis: usize| columns.iter().filter(|of| matches!(of, Column::Position { axis: its, .. } if *its == axis)).count();
         let of_axes = [0, 1, 2].map(columns_of);
-        let is_fixed = columns.iter().any(|column| matches!(column, Column::FixedPoint));
+        let is_fixed = columns.iter().any(|column| matches!(column, Column::FixedPoint | Column::Plane));
         if (of_axes == [0; 3] && !is_fixed && needs != Needs::Joints) || of_axes.iter().any(|count| *count > 1) {
-            return Err("the measured position needs x_m, y_m, z_m (or _mm), those that were read, each once; or fixed_point, a label of the \
-                        unknown place at which the target was"
-                .to_owned());
+            return Err(
+                "the measured position needs x_m, y_m, z_m (or _mm), those that were read, each once; or fixed_point or \
+                        plane, a label of the unknown place at which the target was"
+                    .to_owned(),
+            );
         }
         let quaternion = numbered(&columns, |column| match column {
             Column::Quaternion { component } => Some(*component),

@@ -30,6 +30,8 @@ pub struct Table {
     pub joint_factor: Vec<f64>,
     /// The same of positions, m per unit.
     pub position_factor: [f64; 3],
+    /// How three angles were taken to make orientations; absent where no angles were read.
+    pub euler: Option<Euler>,
     /// Columns of conditions: an identification uses [`TO_IDENTIFY`] of them, a diagnosis all.
     pub conditions: Vec<String>,
     /// What was taken to be meant, and rows that were left out.
@@ -228,9 +230,30 @@ impl std::str::FromStr for Euler {
     }
 }
 
+impl std::fmt::Display for Euler {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Euler::Vector => f.write_str("rotvec"),
+            Euler::Turns { axes, moving } => {
+                let names = if *moving { ["X", "Y", "Z"] } else { ["x", "y", "z"] };
+                axes.iter().try_for_each(|axis| f.write_str(names[*axis]))
+            }
+        }
+    }
+}
+
 impl Euler {
+    /// All ways that differ: turns about the fixed axes in every order (about moving ones they are the same in the other order), and the
+    /// rotation vector.
+    #[must_use]
+    pub fn all() -> Vec<Euler> {
+        let orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+        orders.map(|axes| Euler::Turns { axes, moving: false }).into_iter().chain([Euler::Vector]).collect()
+    }
+
     /// The orientation of `angles` about (or along) x, y and z, rad.
-    fn turn(self, angles: [f64; 3]) -> UnitQuaternion<f64> {
+    #[must_use]
+    pub fn turn(self, angles: [f64; 3]) -> UnitQuaternion<f64> {
         let about = |axis: usize| {
             let mut vector = Vector3::zeros();
             vector[axis] = angles[axis];
@@ -446,7 +469,8 @@ pub fn parse_as(text: &str, file: &str, hints: &Hints) -> Result<Table, TableErr
                 }
                 Column::Session => row.session = Some(text.to_owned()),
                 Column::Target => row.target = Some(text.to_owned()),
-                Column::FixedPoint => row.fixed_point = (!text.is_empty()).then(|| text.to_owned()),
+                Column::FixedPoint => row.fixed_point = (!text::is_missing(text)).then(|| text.to_owned()),
+                Column::Plane => row.plane = (!text::is_missing(text)).then(|| text.to_owned()),
                 Column::Gravity { axis } => {
                     let value = number()?;
                     row.gravity_m_s2.get_or_insert_default()[*axis] = value;
@@ -460,21 +484,29 @@ pub fn parse_as(text: &str, file: &str, hints: &Hints) -> Result<Table, TableErr
         if let Some(read) = row.gravity_m_s2 {
             row.gravity_m_s2 = Some(free_fall(read).map_err(|what| wrong(line, what))?);
         }
-        if let Some(label) = &row.fixed_point {
-            if row.unread != [true; 3] {
+        let labels = [("the fixed point", &row.fixed_point), ("the plane", &row.plane)];
+        let said: Vec<String> = labels.iter().filter_map(|(what, of)| Some(format!("{what} `{}`", (*of).as_ref()?))).collect();
+        if !said.is_empty() {
+            let others = if row.unread == [true; 3] { &said[1..] } else { &said[..] };
+            if let Some(other) = others.first() {
+                let first = if others.len() == said.len() { "a position" } else { said[0].as_str() };
                 let message = format!(
-                    "a position and the fixed point `{label}`: a reading is of one or the other; leave x, y, z empty, or `fixed_point`"
+                    "{first} and {other}: a reading is of one or the other; leave x, y, z empty, or `fixed_point` and `plane`"
                 );
                 return Err(wrong(line, message));
             }
-            row.unread = [false; 3];
+            // Of a plane only the distance from it is known.
+            row.unread = if row.plane.is_some() { [true, true, false] } else { [false; 3] };
         }
         if row.unread == [true; 3] && hints.needs != Needs::Joints {
             empty.push((line, "x, y, z".to_owned()));
             continue;
         }
         match understood.orientation {
-            Orientation::Euler => row.orientation_xyzw = Some(euler.turn(angles).coords.into()),
+            Orientation::Euler => {
+                row.angles_rad = Some(angles);
+                row.orientation_xyzw = Some(euler.turn(angles).coords.into());
+            }
             Orientation::Matrix => {
                 let off = (matrix * matrix.transpose() - Matrix3::identity()).amax();
                 if off > 1e-3 || matrix.determinant() < 0.0 {
@@ -545,7 +577,8 @@ pub fn parse_as(text: &str, file: &str, hints: &Hints) -> Result<Table, TableErr
         said.is_some_and(|said| said == "order:unknown")
     };
     let in_order = !text.lines().any(is_unknown);
-    Ok(Table { measurements, joint_is_length, joint_factor, position_factor, conditions, in_order, notes })
+    let euler = (understood.orientation == Orientation::Euler).then_some(euler);
+    Ok(Table { measurements, joint_is_length, joint_factor, position_factor, euler, conditions, in_order, notes })
 }
 
 /// A date and time as seconds since 1970; without a zone it is taken as UTC.
@@ -597,9 +630,10 @@ pub fn write(measurements: &[Measurement], slides: &[bool]) -> Result<String, cs
         |present: bool, names: &[&str]| if present { names.iter().map(|name| (*name).to_owned()).collect() } else { Vec::new() };
     let mut header = names(true, &["pose_id", "role", "time_s"]);
     header.extend((0..joints).map(|joint| joint_column(joint, slides)));
-    let is_read = |row: &Measurement, axis: usize| !row.unread[axis] && row.fixed_point.is_none();
+    let is_read = |row: &Measurement, axis: usize| !row.unread[axis] && row.is_in_frame();
     let axes: Vec<usize> = (0..3).filter(|axis| measurements.iter().any(|row| is_read(row, *axis))).collect();
     let fixed = measurements.iter().any(|row| row.fixed_point.is_some());
+    let planes = measurements.iter().any(|row| row.plane.is_some());
     header.extend(axes.iter().map(|axis| ["x_m", "y_m", "z_m"][*axis].to_owned()));
     header.extend(names(orientation, &["qx", "qy", "qz", "qw"]));
     header.extend((1..=sensors).map(|sensor| format!("temp{sensor}_c")));
@@ -607,6 +641,7 @@ pub fn write(measurements: &[Measurement], slides: &[bool]) -> Result<String, cs
     header.extend(names(gravity, &["gravity_x", "gravity_y", "gravity_z"]));
     header.extend(optional.iter().filter(|(_, present)| *present).map(|(name, _)| (*name).to_owned()));
     header.extend(names(fixed, &["fixed_point"]));
+    header.extend(names(planes, &["plane"]));
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(&header)?;
     for row in measurements {
@@ -624,23 +659,24 @@ pub fn write(measurements: &[Measurement], slides: &[bool]) -> Result<String, cs
             [number(row.ambient_c), number(row.payload_kg), number(row.dwell_s), row.session.clone(), row.target.clone()];
         fields.extend(optional.iter().zip(values).filter(|((_, present), _)| *present).filter_map(|(_, value)| value));
         fields.extend(fixed.then(|| row.fixed_point.clone().unwrap_or_default()));
+        fields.extend(planes.then(|| row.plane.clone().unwrap_or_default()));
         writer.write_record(&fields)?;
     }
     let bytes = writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// Writes configurations (rad; m where a joint of `slides` slides), one per row, as the columns `pose_id`, `q1_rad` … that [`parse`] reads:
-/// what was read of the target is to be added.
+/// Writes configurations (rad; m where a joint of `slides` slides) in this `order` of their numbers, one per row, as the columns `pose_id` (the
+/// number), `q1_rad` … that [`parse`] reads: what was read of the target is to be added.
 ///
 /// # Errors
 /// None in practice.
-pub fn write_configurations(configurations: &[Vec<f64>], slides: &[bool]) -> Result<String, csv::Error> {
+pub fn write_configurations(configurations: &[Vec<f64>], order: &[usize], slides: &[bool]) -> Result<String, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let joints = (0..slides.len()).map(|joint| joint_column(joint, slides));
     writer.write_record(["pose_id".to_owned()].into_iter().chain(joints))?;
-    for (pose, joints) in configurations.iter().enumerate() {
-        writer.write_record([pose.to_string()].into_iter().chain(joints.iter().map(f64::to_string)))?;
+    for pose in order {
+        writer.write_record([pose.to_string()].into_iter().chain(configurations[*pose].iter().map(f64::to_string)))?;
     }
     let bytes = writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
@@ -664,7 +700,9 @@ mod tests {
     #[test]
     fn what_is_written_is_read_back_bit_for_bit() {
         let row = |index: usize| Measurement {
+            angles_rad: None,
             fixed_point: None,
+            plane: None,
             index,
             pose_id: index / 2,
             role: if index == 1 { Role::HeldOut } else { Role::Fit },
@@ -756,6 +794,9 @@ mod tests {
         let cells: Vec<String> = (0..9).map(|at| matrix[(at / 3, at % 3)].to_string()).collect();
         let text = format!("q1_rad,x_m,r11,r12,r13,r21,r22,r23,r31,r32,r33\n0,0,{}\n", cells.join(","));
         assert!(parse(&text, "t.csv").unwrap().measurements[0].orientation().unwrap().angle_to(&turn) < 1e-9);
+        for euler in Euler::all() {
+            assert!(euler.to_string().parse() == Ok(euler), "{euler}");
+        }
         assert!("zyz".parse::<Euler>().is_err() && "Xyz".parse::<Euler>().is_err());
     }
 

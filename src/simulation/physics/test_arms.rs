@@ -23,7 +23,7 @@ pub(super) fn arm(kinds: &[JointKind], base_and_tool: bool) -> Arm {
     let joints = kinds
         .iter()
         .enumerate()
-        .map(|(index, kind)| Joint { name: format!("joint{}", index + 1), kind: *kind, lower: -3.0, upper: 3.0 })
+        .map(|(index, kind)| Joint { name: format!("joint{}", index + 1), kind: *kind, lower: -3.0, upper: 3.0, mimic: None })
         .collect();
     let six = SixParameters { xyz: [0.1, -0.2, 0.3], rpy: [0.04, -0.05, 2.6] };
     let chain = chain(&frames, joints, base_and_tool.then_some(six), base_and_tool.then_some(six));
