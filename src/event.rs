@@ -93,6 +93,9 @@ pub struct RealCell {
     /// Known distances of fixed points.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub distances: Vec<Distance>,
+    /// What was to be known of the table when it was read, and what was said on the command line.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
 }
 
 /// Whoever listens to a run: takes its events in order.

@@ -173,7 +173,7 @@ pub struct RealArm {
     pub notes: Vec<String>,
 }
 
-/// The nominal robot of a real cell, as its recording's first event describes it.
+/// The nominal robot of a real cell, as its recording's first event describes it, and what is to be known of its file and of the table.
 ///
 /// # Errors
 /// If its URDF or scene cannot be used.
@@ -181,11 +181,11 @@ pub fn real_robot(start: &Start, real: &RealCell) -> Result<(Arm, Vec<String>), 
     match &real.urdf {
         Some(text) => {
             let imported = urdf::import(text, "robot", real.base_link.as_deref(), real.tip_link.as_deref())?;
-            Ok((imported.arm, imported.notes))
+            Ok((imported.arm, [imported.notes, real.notes.clone()].concat()))
         }
         None => {
             let scene = scene::parse(&start.scene, "robot")?.scene;
-            Ok((scene.arm, scene.urdf_notes))
+            Ok((scene.arm, [scene.urdf_notes, real.notes.clone()].concat()))
         }
     }
 }

@@ -81,16 +81,19 @@ fn real_cell(
     let words = Words { fix: &options.fix, free: &options.free, prior: &options.prior };
     let known = known(&nominal.0, words).map_err(anyhow::Error::msg)?;
     let mut nominal = nominal;
+    let mut notes = real.notes.clone();
     for (option, names, meaning) in [
         ("--fix", &options.fix, "held as the file has it"),
         ("--free", &options.free, "free"),
         ("--prior", &options.prior, "one sigma beforehand"),
     ] {
         if !names.is_empty() {
-            nominal.1.push(format!("{meaning}, as {option} says: {}", names.join(", ")));
+            let note = format!("{meaning}, as {option} says: {}", names.join(", "));
+            nominal.1.push(note.clone());
+            notes.push(note);
         }
     }
-    let real = &RealCell { only: options.only.map(Into::into), known, ..real.clone() };
+    let real = &RealCell { only: options.only.map(Into::into), known, notes, ..real.clone() };
     let start = Start { real: Some(real.clone()), ..start };
     let own = real.urdf.clone();
     let real = session::real_arm(real, nominal, &measurements).with_context(|| options.input.display().to_string())?;

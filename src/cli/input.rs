@@ -62,6 +62,7 @@ fn described(command: &str, robot: &Path, options: &RobotOptions) -> anyhow::Res
         only: None,
         zeros: Vec::new(),
         known: Vec::new(),
+        notes: Vec::new(),
         distances: options.distances.as_ref().map(table::read_distances).transpose()?.unwrap_or_default(),
     };
     Ok((Start { real: Some(real.clone()), ..session::start_event(command, &scene) }, real))
@@ -87,6 +88,7 @@ pub(crate) fn front(command: &str, path: &Path, options: &RobotOptions, model: &
     let robot = robot_of_table(path, options)?;
     let (start, mut real) = described(command, robot, options)?;
     let (arm, mut notes) = session::real_robot(&start, &real).with_context(|| robot.display().to_string())?;
+    let of_robot = notes.len();
     let mut table = read_table(path, &arm, options)?;
     notes.extend(table.notes.iter().cloned());
     notes.extend(without_frozen(&mut table, &arm));
@@ -124,6 +126,7 @@ pub(crate) fn front(command: &str, path: &Path, options: &RobotOptions, model: &
             _ => return Err(wrong).with_context(|| path.display().to_string()),
         },
     }
+    real.notes = notes[of_robot..].to_vec();
     let start = Start { real: Some(real.clone()), ..start };
     Ok(Front { start, real, arm, table, notes })
 }

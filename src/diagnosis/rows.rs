@@ -3,6 +3,8 @@
 //!
 //! Postures and targets are in the root frame, the chain's first; equations are in the measurement frame, in which they were read.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::scatter::Scatter;
@@ -14,7 +16,7 @@ use crate::effects::signature::shape::Displacement;
 use crate::identification::geometry::{self, GeometryError};
 use crate::identification::mistake::{self, Explanation, Fix, Said};
 use crate::measurement::equations::Equations;
-use crate::measurement::{Measurement, Sensor};
+use crate::measurement::{Feature, Measurement, Sensor};
 use crate::solver::robust;
 use crate::solver::whitening::Whitening;
 
@@ -190,6 +192,14 @@ pub fn check_robot(
     settings: &Model,
     said: &Said,
 ) -> Result<(), DiagnosisError> {
+    // Some hundred rows are enough to see that nothing is wrong; what is, is looked at in all.
+    let few = thinned(measurements);
+    if few.len() < measurements.len()
+        && first_fit(arm, sensor, &few, settings, said).is_ok()
+        && !mistake::is_suspicious(arm, &few)
+    {
+        return Ok(());
+    }
     let first = match first_fit(arm, sensor, measurements, settings, said) {
         Ok(first) => first,
         Err(DiagnosisError::Geometry(_)) => return Ok(()),
@@ -214,6 +224,28 @@ pub fn check_robot(
         }
     }
     Ok(())
+}
+
+/// Rows from which on some of them are looked at first, and how many of a set-up and a target at least.
+const MANY: usize = 400;
+const OF_EACH: usize = 40;
+
+/// Some hundred of `measurements`, evenly of each session, target and fixed point or plane.
+fn thinned<'a>(measurements: &[&'a Measurement]) -> Vec<&'a Measurement> {
+    type Key<'k> = (Option<&'k str>, Option<&'k str>, Option<Feature>);
+    let key = |row: &&'a Measurement| -> Key<'a> { (row.session.as_deref(), row.target.as_deref(), row.feature()) };
+    let mut counts: BTreeMap<Key<'_>, usize> = BTreeMap::new();
+    measurements.iter().for_each(|row| *counts.entry(key(row)).or_default() += 1);
+    let mut seen: BTreeMap<Key<'_>, usize> = BTreeMap::new();
+    let stride = measurements.len().div_ceil(MANY);
+    let mut kept = |row: &&&'a Measurement| {
+        let key = key(row);
+        let own = stride.min(counts.get(&key).map_or(1, |count| count / OF_EACH)).max(1);
+        let number = seen.entry(key).or_default();
+        *number += 1;
+        (*number - 1) % own == 0
+    };
+    measurements.iter().filter(|row| kept(row)).copied().collect()
 }
 
 /// A corrected table is taken for the right one where a calibration leaves so much less of it.

@@ -4,6 +4,8 @@
 //! Base and target are free, each session may have a base of its own and each target on the tool has its place. Every joint frame but the
 //! first is off by six small errors ([`FrameErrors`]) with Gaussian priors of the size that machining and assembly leave.
 
+mod relax;
+
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 
 use super::feature;
@@ -1060,7 +1062,7 @@ mod tests {
     use crate::seed::{Stream, stream};
 
     /// An arm of `count` joints whose frames are drawn; some joints slide.
-    fn arm(count: usize, stream: &mut Stream) -> Arm {
+    pub(super) fn arm(count: usize, stream: &mut Stream) -> Arm {
         let mut frame = || mdh::Frame {
             alpha: stream.uniform(-2.0, 2.0),
             a: stream.uniform(-0.4, 0.4),
@@ -1083,7 +1085,7 @@ mod tests {
         }
     }
 
-    fn sensor(orientation: bool) -> Sensor {
+    pub(super) fn sensor(orientation: bool) -> Sensor {
         Sensor {
             position_in_base: nalgebra::Point3::origin(),
             position_sigma_m: 2e-5,
@@ -1096,7 +1098,14 @@ mod tests {
     }
 
     /// Readings of `arm` with frame errors of `wrong` prior sigmas, in sessions of which each has its base.
-    fn readings(arm: &Arm, count: usize, sessions: usize, wrong: f64, noise: f64, stream: &mut Stream) -> Vec<Measurement> {
+    pub(super) fn readings(
+        arm: &Arm,
+        count: usize,
+        sessions: usize,
+        wrong: f64,
+        noise: f64,
+        stream: &mut Stream,
+    ) -> Vec<Measurement> {
         let frames = FrameErrors::new(&arm.chain);
         let mut six = |size: f64| -> Vec<f64> { (0..6).map(|_| stream.uniform(-size, size)).collect() };
         let bases: Vec<Pose> = (0..sessions).map(|_| FrameErrors::pose(&six(2.0))).collect();

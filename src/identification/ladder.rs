@@ -101,11 +101,11 @@ pub fn climb(arm: &Arm, readings: Readings<'_>, only: Option<Freedom>) -> Result
         if only.is_some_and(|only| only != free) {
             continue;
         }
-        let mut geometry = loose.refit_roughly(arm, readings, free.of(likeliest))?;
+        let mut geometry = loose.relaxed(arm, readings, free.of(likeliest))?;
         if free != Freedom::BaseAndTarget && free != Freedom::Geometry {
             let sizes = geometry.likeliest_sizes();
             if sizes != geometry.sizes() {
-                geometry = geometry.refit_roughly(arm, readings, sizes)?;
+                geometry = geometry.relaxed(arm, readings, sizes)?;
             }
         }
         let left_out = left_out(&geometry, readings, &good);

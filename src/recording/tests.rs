@@ -108,6 +108,7 @@ fn events(size: &Size) -> Vec<Event> {
             poses: Some(19),
             real: Some(RealCell {
                 known: Vec::new(),
+                notes: Vec::new(),
                 only: None,
                 zeros: Vec::new(),
                 distances: Vec::new(),
@@ -1017,7 +1018,7 @@ fn a_measurement_without_conditions_reads_as_without() {
         target: Some("A".to_owned()),
         angles_rad: None,
         fixed_point: Some("socket".to_owned()),
-        plane: None,
+        plane: Some("plate".to_owned()),
         unread: [false, false, true],
         ..expected
     };

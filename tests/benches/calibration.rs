@@ -2,13 +2,15 @@
 
 use divan::{Bencher, black_box};
 use kincal::arm::self_collision::{self, CollisionCheck};
+use kincal::arm::urdf;
 use kincal::design::candidates::{Rules, Sampler};
 use kincal::design::objective::{Models, Objective};
 use kincal::design::problem::Criterion;
 use kincal::design::search::{SearchReport, Task, split};
 use kincal::design::swarm;
-use kincal::identification::identify;
-use kincal::measurement::Measurement;
+use kincal::identification::real::Wishes;
+use kincal::identification::{identify, identify_real};
+use kincal::measurement::{Measurement, Sensor};
 use kincal::progress::Silent;
 use kincal::quality::evaluator::{Evaluator, Scratch};
 use kincal::scene::SceneFile;
@@ -77,6 +79,26 @@ fn identification(bencher: Bencher, name: &str) {
     let measurements = measurements(&file, 50);
     let scene = &file.scene;
     bencher.bench_local(|| identify(&scene.arm, &scene.sensor, scene.weights, black_box(&measurements)));
+}
+
+/// Identification of a real arm with six joints from positions alone, the ladder included. Marks: 50 ms for 1000, 1 s for 20 000.
+#[divan::bench(args = [1000, 20_000], sample_count = 5)]
+fn real_arm(bencher: Bencher, count: usize) {
+    let robot = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/tutorial.urdf");
+    let arm = urdf::read(&robot, None, None).expect("a shipped robot").arm;
+    let mut draws = stream(1, "bench/real");
+    let values: Vec<f64> = arm.chain.nominal().iter().map(|value| value + 5e-4 * draws.normal()).collect();
+    let chain = arm.chain.at(&values);
+    let rows: Vec<Measurement> = (0..count)
+        .map(|index| {
+            let joints: Vec<f64> = arm.chain.joints.iter().map(|of| draws.uniform(of.lower, of.upper)).collect();
+            let at = chain.forward(&joints).translation.vector;
+            let position_m = [at.x, at.y, at.z].map(|value| value + 5e-5 * draws.normal());
+            Measurement { index, pose_id: index, joints, position_m, ..Measurement::default() }
+        })
+        .collect();
+    let sensor = Sensor::uniform(5e-5, None);
+    bencher.bench_local(|| identify_real(&arm, &sensor, black_box(&rows), Wishes::default()).expect("an arm"));
 }
 
 fn sets(file: &SceneFile, count: usize) -> Vec<Vec<f64>> {

@@ -13,7 +13,7 @@ use serde_json::Value;
 use crate::harness::{kincal, number};
 
 /// An arm of six joints with an elbow.
-fn robot() -> String {
+fn six_joints() -> String {
     let frames = [
         ("waist", "0 0 0.3", "0 0 0"),
         ("shoulder", "0.05 0 0.1", "-1.5708 0 0"),
@@ -48,8 +48,8 @@ impl Cell {
     fn new(name: &str) -> Cell {
         let folder = tempfile::tempdir().unwrap();
         let robot = folder.path().join("six.urdf");
-        std::fs::write(&robot, robot()).unwrap();
-        let nominal = urdf::import(&robot(), "six", None, None).unwrap().arm;
+        std::fs::write(&robot, six_joints()).unwrap();
+        let nominal = urdf::import(&six_joints(), "six", None, None).unwrap().arm;
         let mut draws = stream(1, &format!("test/tables/{name}"));
         let values: Vec<f64> = nominal.chain.nominal().iter().map(|value| value + 5e-4 * draws.normal()).collect();
         let base = Pose::from_parts(Vector3::new(0.8, -0.3, 0.2).into(), rotation_from_vector(&Vector3::new(0.2, -0.1, 1.1)));
@@ -206,6 +206,9 @@ fn readings_of_a_sensor_that_stood_still_are_left_out_and_named() {
     let said = notes(&json);
     assert!(said.contains("readings 11, 12, 13, 41 repeat the one before to the last digit"), "{said}");
     assert!(1e3 * number(&json, "/fitted/position_m/rms") < 0.05);
+    // What was said of the table is in the recording, too.
+    let recording = cell.folder.path().join("frozen-identified.mcap");
+    kincal(cell.folder.path(), &["replay", recording.to_str().unwrap()]).ends(0);
     let robot = cell.robot.to_str().unwrap();
     let diagnosed = kincal(cell.folder.path(), &["diagnose", &table, "--robot", robot, "--position-noise-um", "20", "--json"]);
     assert!(notes(&diagnosed.json()).contains("repeat the one before"), "{}", diagnosed.stderr);
@@ -262,7 +265,7 @@ fn what_is_said_of_the_geometry_beforehand_holds() {
 #[test]
 fn driven_joints_follow_those_that_drive_them() {
     let mut cell = Cell::new("driven");
-    let text = robot().replacen(
+    let text = six_joints().replacen(
         "<limit lower=\"-2.6\" upper=\"2.6\" effort=\"1\" velocity=\"1\"/></joint>\n<link name=\"l4\"/>",
         "<limit lower=\"-2.6\" upper=\"2.6\" effort=\"1\" velocity=\"1\"/><mimic joint=\"shoulder\" multiplier=\"-1\" offset=\"0.5\"/></joint>\n\
          <link name=\"l4\"/>",

@@ -105,12 +105,14 @@ pub const TO_IDENTIFY: [&str; 2] = ["session", "target"];
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
     /// The file cannot be read.
-    #[error("cannot read {file}: {source}; give a table of measurements (.csv)")]
+    #[error("cannot read {file}: {source}; give {wanted}")]
     Unreadable {
         /// Path.
         file: String,
         /// Cause.
         source: std::io::Error,
+        /// What is needed.
+        wanted: &'static str,
     },
     /// Something in the header or a row is wrong.
     #[error("{file}, line {line}: {message}")]
@@ -130,7 +132,11 @@ pub enum TableError {
 /// If the file cannot be read, or names the line and what is wrong with it.
 pub fn read_distances(path: impl AsRef<Path>) -> Result<Vec<Distance>, TableError> {
     let file = path.as_ref().display().to_string();
-    let text = std::fs::read_to_string(path.as_ref()).map_err(|source| TableError::Unreadable { file: file.clone(), source })?;
+    let text = std::fs::read_to_string(path.as_ref()).map_err(|source| TableError::Unreadable {
+        file: file.clone(),
+        source,
+        wanted: "a table of distances (.csv)",
+    })?;
     let wrong = |line, message| TableError::Wrong { file: file.clone(), line, message };
     let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
     let header = reader.headers().map_err(|error| wrong(1, error.to_string()))?.clone();
