@@ -288,7 +288,8 @@ pub fn read(path: impl AsRef<Path>) -> Result<Table, TableError> {
 pub fn read_as(path: impl AsRef<Path>, hints: &Hints) -> Result<Table, TableError> {
     let path = path.as_ref();
     let file = path.display().to_string();
-    let unreadable = |source: std::io::Error| TableError::Unreadable { file: file.clone(), source };
+    let unreadable =
+        |source: std::io::Error| TableError::Unreadable { file: file.clone(), source, wanted: "a table of measurements (.csv)" };
     let about = std::fs::metadata(path).map_err(unreadable)?;
     if !about.is_file() {
         return Err(unreadable(std::io::Error::other("it is no regular file")));
