@@ -147,6 +147,7 @@ mod figure;
 #[cfg(feature = "cli")]
 pub mod lab;
 
+pub mod files;
 pub mod numerics;
 pub mod seed;
 pub mod statistics;

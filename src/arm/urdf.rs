@@ -7,6 +7,7 @@ mod export;
 mod import;
 mod locate;
 mod others;
+mod plausible;
 mod rewrite;
 pub(crate) mod rpy;
 #[cfg(test)]

@@ -80,7 +80,7 @@ impl Progress<Step> for Bar {
             Step::Done => self.bar.inc(1),
             Step::Remark(text) if !self.quiet => self.bar.suspend(|| {
                 // Nobody reads it: no reason to stop.
-                let _ = writeln!(std::io::stderr().lock(), "{text}");
+                let _ = writeln!(std::io::stderr().lock(), "{}", super::output::plain(&text));
             }),
             Step::Remark(_) => {}
         }

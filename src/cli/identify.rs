@@ -155,6 +155,7 @@ fn with_evaluation(mut measurements: Vec<Measurement>, options: &IdentifyOptions
         let mut table = input::read_table(other, arm, &options.robot)?;
         input::check_units(other, &table, arm)?;
         input::corrected(&mut table, arm, &options.robot)?;
+        table.forget_angles();
         table.measurements
     };
     ensure!(!others.is_empty(), "{} holds no measurements", other.display());

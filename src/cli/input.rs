@@ -50,7 +50,7 @@ fn described(command: &str, robot: &Path, options: &RobotOptions) -> anyhow::Res
     } else {
         // Read as a file first: its errors name lines.
         urdf::read(robot, options.base_link.as_deref(), options.tip_link.as_deref())?;
-        Some(std::fs::read_to_string(robot).with_context(|| robot.display().to_string())?)
+        Some(crate::files::text(robot, crate::files::LARGEST_TEXT).with_context(|| robot.display().to_string())?)
     };
     let real = RealCell {
         urdf,
@@ -127,6 +127,7 @@ pub(crate) fn front(command: &str, path: &Path, options: &RobotOptions, model: &
         },
     }
     real.notes = notes[of_robot..].to_vec();
+    table.forget_angles();
     let start = Start { real: Some(real.clone()), ..start };
     Ok(Front { start, real, arm, table, notes })
 }

@@ -53,7 +53,7 @@ pub fn main() -> ExitCode {
         Ok(Outcome::Bad) => ExitCode::from(1),
         Err(error) => {
             // Where even stderr is full, the exit code must do.
-            let _ = writeln!(std::io::stderr().lock(), "kincal: {}", in_full(&error));
+            let _ = writeln!(std::io::stderr().lock(), "kincal: {}", output::plain(&in_full(&error)));
             ExitCode::from(2)
         }
     }

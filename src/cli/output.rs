@@ -84,8 +84,14 @@ pub(crate) fn plan_notes(global: &Global, scene: &Scene, injected: &Injected) {
 /// A note for people: on stderr, and not at all if they want quiet.
 pub(crate) fn note(global: &Global, text: &str) {
     if !global.quiet {
-        let _ = writeln!(std::io::stderr().lock(), "{text}");
+        let _ = writeln!(std::io::stderr().lock(), "{}", plain(text));
     }
+}
+
+/// `text` without what a terminal would obey: names in files may hold anything.
+pub(crate) fn plain(text: &str) -> std::borrow::Cow<'_, str> {
+    let obeyed = |c: char| c.is_control() && c != '\n' && c != '\t';
+    if text.contains(obeyed) { text.replace(obeyed, "\u{fffd}").into() } else { text.into() }
 }
 
 /// A result for people: on stdout, unless that is for a machine.
@@ -100,7 +106,7 @@ pub(crate) fn show_json(global: &Global, value: &serde_json::Value) -> anyhow::R
 
 /// Writes to stdout; a reader that went away (`| head`) is no error.
 pub(crate) fn print(text: &str) -> anyhow::Result<()> {
-    match writeln!(std::io::stdout().lock(), "{text}") {
+    match writeln!(std::io::stdout().lock(), "{}", plain(text)) {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         other => Ok(other?),
     }
@@ -251,7 +257,7 @@ impl Audience {
         if let Some(viewer) = self.viewer.take() {
             match viewer.finish() {
                 // Silent watches any more: no reason to call the run a failure.
-                Err(error @ crate::viewing::ViewerError::Lost { .. }) => eprintln!("note: {error}"),
+                Err(error @ crate::viewing::ViewerError::Lost { .. }) => eprintln!("note: {}", plain(&error.to_string())),
                 other => other?,
             }
         }

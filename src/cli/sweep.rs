@@ -188,7 +188,8 @@ impl Axes {
     fn new(options: &SweepOptions) -> anyhow::Result<Axes> {
         let mut axes = match &options.grid {
             Some(path) => {
-                let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+                let text = crate::files::text(path, crate::files::LARGEST_TEXT)
+                    .with_context(|| format!("cannot read {}", path.display()))?;
                 toml::from_str(&text).map_err(|error| anyhow::anyhow!("{}: {}", path.display(), error.to_string().trim_end()))?
             }
             None => Axes::default(),

@@ -275,8 +275,16 @@ pub(crate) fn first_fit(
     said: &Said,
 ) -> Result<First, DiagnosisError> {
     let weights = vec![1.0; measurements.len()];
-    let readings =
-        geometry::Readings { sensor, measurements, weights: &weights, displacement: &[], scatter: &[], zeros: &[], known: &[] };
+    let readings = geometry::Readings {
+        sensor,
+        measurements,
+        weights: &weights,
+        displacement: &[],
+        scatter: &[],
+        zeros: &[],
+        known: &[],
+        events: robust::Events::Counted,
+    };
     let loose = geometry::fit(arm, readings)?;
     let rows = of_geometry(arm, measurements, loose.clone());
     let mechanism = Mechanism::new(arm);
@@ -327,6 +335,7 @@ impl First {
             scatter: &[],
             zeros: &[],
             known: &[],
+            events: robust::Events::Counted,
         };
         Ok(geometry::shrunk_residual(arm, readings, &self.loose)?)
     }
@@ -341,7 +350,16 @@ pub(crate) fn fit(arm: &Arm, readings: Readings<'_>) -> Result<Rows, DiagnosisEr
     let scatter: Vec<(usize, f64)> = scatter.iter().map(|one| (one.joint, one.sigma)).collect();
     let fitted = geometry::fit(
         arm,
-        geometry::Readings { sensor, measurements, weights, displacement, scatter: &scatter, zeros: &[], known: &[] },
+        geometry::Readings {
+            sensor,
+            measurements,
+            weights,
+            displacement,
+            scatter: &scatter,
+            zeros: &[],
+            known: &[],
+            events: robust::Events::Counted,
+        },
     )?;
     Ok(of_geometry(arm, measurements, fitted))
 }

@@ -31,7 +31,7 @@ pub(super) fn weigh(rows: &Rows, residual: &DVector<f64>, before: &[f64], groups
     let sigmas: Vec<f64> = (0..before.len()).flat_map(of_row).collect();
     let squares: Vec<f64> =
         (0..before.len()).map(|row| sigmas[equations.of(row)].iter().map(|value| value * value).sum::<f64>()).collect();
-    let far = robust::weights(&squares, &equations.counts());
+    let far = robust::weights(&squares, &equations.counts(), robust::Events::Counted);
     let near: Vec<bool> = far.iter().map(|weight| *weight > settings.near).collect();
     let (dependent, correlation) = groups::weights(groups, &sigmas, equations, &near, settings);
     Weighed { squares, far, dependent, correlation }

@@ -19,6 +19,7 @@ use crate::arm::{Arm, ChainAt};
 use crate::measurement::equations::{COMPONENTS, Equations};
 use crate::measurement::{Distance, Feature, Measurement, Sensor};
 use crate::numerics::gram;
+use crate::solver::robust::Events;
 use crate::solver::whitening::Whitening;
 use crate::solver::{Fit, Linearised, Problem, STEP_TOLERANCE, Stop, robust, solve};
 
@@ -97,6 +98,8 @@ pub struct Readings<'a> {
     pub zeros: &'a [f64],
     /// What somebody knows of the arm beforehand.
     pub known: &'a [Known],
+    /// What is made of readings that are far off in a row.
+    pub events: Events,
 }
 
 /// A fitted geometry, and what it leaves of the readings.
@@ -942,7 +945,7 @@ impl<'a> Placing<'a> {
     /// Weight of each row for how far off it is at `placed`, and the mean square of the noise over the declared one.
     fn far_off(&self, placed: &Placed) -> (Vec<f64>, f64) {
         let (counts, squares) = (self.equations.counts(), self.squares(placed));
-        let mut far = robust::weights(&squares, &counts);
+        let mut far = robust::weights(&squares, &counts, self.readings.events);
         far.iter_mut().filter(|weight| **weight >= robust::FAR).for_each(|weight| *weight = 1.0);
         (far, robust::level(&squares, &counts))
     }
@@ -1147,6 +1150,7 @@ mod tests {
                 scatter: &[],
                 zeros: &[],
                 known: &[],
+                events: Events::LeftOut,
             };
             let found = fit(&arm, of).unwrap();
             assert_eq!((found.stop, found.sessions.len()), (Stop::Converged, sessions));
@@ -1172,6 +1176,7 @@ mod tests {
             scatter: &[],
             zeros: &[],
             known: &[],
+            events: Events::LeftOut,
         };
         let before = fit(&arm, whole).unwrap();
         let turn = before.measurement_from_root()[0].rotation;
@@ -1211,6 +1216,7 @@ mod tests {
                 scatter: &[],
                 zeros: &[],
                 known: &[],
+                events: Events::LeftOut,
             };
             let square = |found: &Geometry| -> f64 {
                 others.iter().map(|row| difference(row, &found.predict(row)).fixed_rows::<3>(0).norm_squared()).sum()
@@ -1232,6 +1238,7 @@ mod tests {
             scatter: &[],
             zeros: &[],
             known: &[],
+            events: Events::LeftOut,
         };
         let sizes = fit(&arm, of).unwrap().likeliest_sizes();
         assert_eq!((sizes.lengths, sizes.turns), (0.3, 0.3), "{sizes:?}");
@@ -1265,6 +1272,7 @@ mod tests {
                     scatter: &[],
                     zeros: &[],
                     known: &[],
+                    events: Events::LeftOut,
                 };
                 let found = fit(&arm, of).unwrap();
                 others.iter().map(|row| difference(row, &found.predict(row)).fixed_rows::<3>(0).norm_squared()).sum()
@@ -1300,7 +1308,7 @@ mod tests {
                     displacement: &[],
                     scatter: &[],
                     zeros: &[],
-    known: &[],
+    known: &[], events: Events::LeftOut,
                 };
                 let problem = Placing::new(&arm, of, &session, sessions, Sizes { zeros: scale, lengths: scale, turns: scale }).unwrap();
                 let all: Vec<usize> = (0..problem.free.len()).collect();

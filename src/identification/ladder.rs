@@ -240,6 +240,7 @@ mod tests {
                 scatter: &[],
                 zeros: &[],
                 known: &[],
+                events: robust::Events::LeftOut,
             };
             let sizes = from.map_or(Sizes::MANUFACTURING, Geometry::sizes);
             let geometry = super::super::geometry::fit_at(&arm, readings, sizes).unwrap();

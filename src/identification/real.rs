@@ -221,6 +221,7 @@ fn climb_with(robot: &Arm, sensor: &Sensor, rows: &[Measurement], wishes: Wishes
         scatter: &[],
         zeros: wishes.zeros,
         known: wishes.known,
+        events: robust::Events::LeftOut,
     };
     Ok(climb(robot, readings, wishes.only)?)
 }
@@ -305,7 +306,7 @@ fn far_off(
     let orientations: Vec<usize> = (0..all.len()).map(|row| equations.of(row).len() - positions[row]).collect();
     let far_in = |counts: &[usize], first: &dyn Fn(usize) -> usize| -> Vec<bool> {
         let squares: Vec<f64> = (0..all.len()).map(|row| errors[row].rows(first(row), counts[row]).norm_squared()).collect();
-        let weights = robust::weights(&squares, counts);
+        let weights = robust::weights(&squares, counts, robust::Events::LeftOut);
         let is_noise = declared && robust::level(&squares, counts) < IS_NOISE;
         let limit = |row: usize| if is_noise && all[row].role == Role::Fit { FAR_FROM_NOISE } else { robust::FAR };
         (0..all.len()).map(|row| counts[row] > 0 && weights[row] * unsure < limit(row)).collect()
@@ -326,8 +327,16 @@ fn tell(
     let fit: Vec<&Measurement> = measurements.iter().filter(|row| row.role == Role::Fit).collect();
     let Climbed { geometry, rungs } = climbed;
     let weights = vec![1.0; fit.len()];
-    let readings =
-        Readings { sensor, measurements: &fit, weights: &weights, displacement: &[], scatter: &[], zeros: &[], known: &[] };
+    let readings = Readings {
+        sensor,
+        measurements: &fit,
+        weights: &weights,
+        displacement: &[],
+        scatter: &[],
+        zeros: &[],
+        known: &[],
+        events: robust::Events::LeftOut,
+    };
     let nominal = geometry.refit(robot, readings, Sizes::NOMINAL)?.with_features_of(measurements);
     let geometry = geometry.with_features_of(measurements);
     let aligned = &alignment::placed(robot, &nominal);

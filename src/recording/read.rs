@@ -212,7 +212,7 @@ impl Messages {
     /// If the file cannot be read, is no MCAP, is one of others, or holds not even its first message.
     pub fn open(path: &Path) -> Result<Messages, ReadError> {
         let input = |source| ReadError::Input { path: path.to_owned(), source };
-        let mut file = File::open(path).map_err(input)?;
+        let mut file = crate::files::open(path, u64::MAX).map_err(input)?;
         let file_length = file.metadata().map_err(input)?.len();
         let mut head = Vec::new();
         (&mut file).take(MAGIC.len() as u64).read_to_end(&mut head).map_err(input)?;

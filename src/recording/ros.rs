@@ -4,7 +4,6 @@
 //! bytes of each say its byte order (DDS-XTypes 1.3, 7.6.2).
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -208,7 +207,7 @@ fn of_database(path: &Path) -> BagError {
 
 fn read_file(path: &Path, bag: &mut Bag) -> Result<(), BagError> {
     let input = |source| BagError::Input { path: path.to_owned(), source };
-    let mut file = File::open(path).map_err(input)?;
+    let mut file = crate::files::open(path, u64::MAX).map_err(input)?;
     let mut head = Vec::new();
     (&mut file).take(16).read_to_end(&mut head).map_err(input)?;
     if head.starts_with(b"SQLite format") {

@@ -32,7 +32,8 @@ pub struct SceneFile {
 /// If the file cannot be read or is not a valid scene; the message names line, key, what was found and what is allowed.
 pub fn read(path: impl AsRef<Path>) -> Result<SceneFile, SceneError> {
     let path = path.as_ref();
-    let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
+    let text = crate::files::text(path, crate::files::LARGEST_TEXT)
+        .map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
     in_folder(&text, &path.display().to_string(), path.parent())
 }
 

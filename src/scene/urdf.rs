@@ -5,14 +5,6 @@ use std::path::Path;
 use super::error::Invalid;
 use super::file::{ArmToml, Convention};
 use crate::arm::urdf::{self, Imported, UrdfError};
-use crate::arm::{Arm, Geometry, Link};
-use crate::arm::{JointKind, Quantity};
-
-/// Largest length (m), angle (rad), mass (kg) and moment of inertia (kg·m²) that are taken for meant, as everywhere in a scene.
-const LARGEST_LENGTH_M: f64 = 100.0;
-const LARGEST_ANGLE_RAD: f64 = 200.0 * std::f64::consts::PI;
-const LARGEST_MASS_KG: f64 = 1e5;
-const LARGEST_INERTIA_KG_M2: f64 = 1e6;
 
 const EITHER: &str = "urdf_file = \"…\" or urdf = '''<robot …>''', one of the two";
 
@@ -30,7 +22,7 @@ pub(super) fn inline(arm: &mut ArmToml, folder: Option<&Path>) -> Result<Option<
         return Err(Invalid::new("arm.urdf_file", format!("{name:?}, but no folder to look for it in"), EITHER, remedy));
     };
     let path = folder.join(name);
-    let text = std::fs::read_to_string(&path).map_err(|error| {
+    let text = crate::files::text(&path, crate::files::LARGEST_TEXT).map_err(|error| {
         let found = format!("{}: {error}", path.display());
         Invalid::new("arm.urdf_file", found, "a URDF; its path is relative to the scene's folder", "check the path")
     })?;
@@ -91,13 +83,7 @@ pub(super) fn arm(file: &ArmToml) -> Result<Imported, Invalid> {
             "remove <mimic> if it is driven on its own, or end the chain before it with urdf_tip_link",
         ));
     }
-    match too_large(&imported.arm) {
-        None => Ok(imported),
-        Some((found, largest)) => {
-            let allowed = format!("{largest} at most");
-            Err(Invalid::new("arm.urdf", found, allowed, "check the number: units of a URDF are m, rad and kg"))
-        }
-    }
+    Ok(imported)
 }
 
 /// The importer's error at the key of the scene that it is about. Options of the command line are keys here.
@@ -117,47 +103,4 @@ fn invalid(error: UrdfError) -> Invalid {
         }
         other => Invalid::new("arm.urdf", other.to_string(), "the URDF of a serial arm", "correct the URDF"),
     }
-}
-
-/// What nobody means, and the largest amount that is taken for meant.
-fn too_large(arm: &Arm) -> Option<(String, String)> {
-    let beyond = |what: String, values: &[f64], largest: f64, unit: &str| {
-        let found = values.iter().find(|value| value.abs() > largest)?;
-        Some((format!("{what} {found} {unit}"), format!("{largest:.0} {unit}")))
-    };
-    let length = |what: String, values: &[f64]| beyond(what, values, LARGEST_LENGTH_M, "m");
-    let parameters = arm.chain.parameters.iter().find_map(|parameter| match parameter.quantity {
-        Quantity::Length => length(parameter.name.clone(), &[parameter.nominal]),
-        Quantity::Angle => beyond(parameter.name.clone(), &[parameter.nominal], LARGEST_ANGLE_RAD, "rad"),
-    });
-    let limits = || {
-        arm.chain.joints.iter().find_map(|joint| {
-            let what = format!("joint {:?}: limit", joint.name);
-            match joint.kind {
-                JointKind::Revolute => beyond(what, &[joint.lower, joint.upper], LARGEST_ANGLE_RAD, "rad"),
-                JointKind::Prismatic => length(what, &[joint.lower, joint.upper]),
-            }
-        })
-    };
-    let of_link = |link: &Link| {
-        let what = |what: &str| format!("link {:?}: {what}", link.name);
-        let inertial = link.inertial.as_ref().and_then(|inertial| {
-            beyond(what("mass"), &[inertial.mass_kg], LARGEST_MASS_KG, "kg")
-                .or_else(|| length(what("centre of mass at"), inertial.centre_of_mass_in_link.coords.as_slice()))
-                .or_else(|| beyond(what("inertia"), inertial.inertia_in_link.as_slice(), LARGEST_INERTIA_KG_M2, "kg·m²"))
-        });
-        inertial.or_else(|| {
-            link.shapes.iter().find_map(|shape| {
-                let [x, y, z]: [f64; 3] = shape.link_from_shape.translation.vector.into();
-                length(what("a shape at"), &[x, y, z]).or_else(|| match shape.geometry {
-                    Geometry::Capsule { half_length, radius } | Geometry::Cylinder { half_length, radius } => {
-                        length(what("a shape of"), &[half_length, radius])
-                    }
-                    Geometry::Box { half_extents } => length(what("a shape of"), &half_extents),
-                    Geometry::Sphere { radius } => length(what("a shape of"), &[radius]),
-                })
-            })
-        })
-    };
-    parameters.or_else(limits).or_else(|| arm.links.iter().find_map(of_link))
 }

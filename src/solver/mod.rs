@@ -4,7 +4,7 @@
 //! What is minimised is the sum of squares of a problem's weighted residuals and of the departures of its parameters from where the
 //! prior has them, both in sigmas. A step that raises it is never taken.
 
-pub(crate) mod robust;
+pub mod robust;
 pub mod whitening;
 
 use std::borrow::Cow;

@@ -31,11 +31,24 @@ pub(crate) fn level(squares: &[f64], counts: &[usize]) -> f64 {
     sorted.get(sorted.len() / 2).copied().unwrap_or(1.0).max(1e-12)
 }
 
+/// Readings that are far off in a row: a step or another session.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Events {
+    /// They count like all others: what they are is to be found out.
+    Counted,
+    /// They count as little as single ones: the rest is to be told without them.
+    #[default]
+    LeftOut,
+}
+
 /// Weights of readings with these squared residuals, of so many equations each, in the order of measuring (Huber's, on the squares): one
-/// for all but rare ones, and for those of an [`event`].
+/// for all but rare ones, and for those of an [`event`] where these are counted.
 #[must_use]
-pub(crate) fn weights(squares: &[f64], counts: &[usize]) -> Vec<f64> {
+pub(crate) fn weights(squares: &[f64], counts: &[usize], events: Events) -> Vec<f64> {
     let mut weights = by_size(squares, counts);
+    if events == Events::LeftOut {
+        return weights;
+    }
     weights.iter_mut().zip(event(squares, counts)).filter(|(_, event)| *event).for_each(|(weight, _)| *weight = 1.0);
     weights
 }
@@ -100,7 +113,7 @@ mod tests {
         for unit in [1e-3, 1.0, 50.0] {
             let mut squares = vec![median(3) * unit; 20];
             squares.extend([4.0 * rare(3) * unit, rare(3) * unit]);
-            let found = weights(&squares, &[3; 22]);
+            let found = weights(&squares, &[3; 22], Events::Counted);
             assert!(found[..20].iter().all(|weight| *weight == 1.0));
             assert!((found[20] - 1.0 / 16.0).abs() < 1e-12 && (found[21] - 1.0).abs() < 1e-9, "{found:?}");
         }
@@ -111,7 +124,7 @@ mod tests {
         // Squares of three equations with sigma 3: the median is 9 times the table's.
         let squares: Vec<f64> = (0..100).map(|at| if at % 9 == 0 { 1e6 } else { 9.0 * median(3) }).collect();
         assert!((level(&squares, &[3; 100]) - 9.0).abs() < 1e-12);
-        let weights = weights(&squares, &[3; 100]);
+        let weights = weights(&squares, &[3; 100], Events::Counted);
         assert!(weights.iter().enumerate().all(|(at, weight)| if at % 9 == 0 { *weight < 1e-6 } else { *weight == 1.0 }));
     }
 

@@ -167,9 +167,13 @@ fn a_design_comes_out_as_a_table_and_a_calibrated_arm_under_a_name_of_its_own() 
     assert_eq!(rows.next().unwrap(), "pose_id,q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,q7_rad,q8_rad");
     let chosen = designed["design"]["configurations"].as_array().unwrap();
     assert_eq!(rows.clone().count(), chosen.len());
-    for (row, joints) in rows.zip(chosen) {
-        let values = row.split(',').skip(1).map(|value| value.parse::<f64>().unwrap());
-        assert!(values.eq(joints.as_array().unwrap().iter().map(|value| value.as_f64().unwrap())), "{row}");
+    let mut visited = vec![false; chosen.len()];
+    for row in rows {
+        let mut cells = row.split(',');
+        let number: usize = cells.next().unwrap().parse().unwrap();
+        let values = cells.map(|value| value.parse::<f64>().unwrap());
+        assert!(values.eq(chosen[number].as_array().unwrap().iter().map(|value| value.as_f64().unwrap())), "{row}");
+        assert!(!std::mem::replace(&mut visited[number], true), "{number} twice");
     }
     let run = quick_run(&[]);
     let nominal = fs::read(run.path("arm8.urdf")).unwrap();

@@ -146,7 +146,7 @@ fn what_a_urdf_lacks_is_said() {
     }
     let ran = with(&out, &["run", &scene], &QUICK).ends(2);
     assert!(ran.stderr.contains("panda.toml: link `panda_link1` has no inertial"), "{}", ran.stderr);
-    assert_eq!(names(&out), ["panda-design.mcap"]);
+    assert_eq!(names(&out), ["panda-design.csv", "panda-design.mcap"]);
     // Only the mesh: the run says so in its report, and a replay of it does not differ.
     let set = ["--set", "arm.uncollidable=[]"];
     fs::write(

@@ -6,7 +6,8 @@ use std::path::Path;
 use nalgebra::{Matrix3, Point3, Translation3, Vector3};
 use urdf_rs::JointType;
 
-use super::locate::{Element, Malformed, Outline, line_of, outline};
+use super::locate::{DEEPEST, Element, Malformed, Outline, line_of, outline};
+use super::plausible::too_large;
 use super::rpy::{rotation_from_rpy, z_onto};
 use super::{UrdfError, UrdfProblem};
 use crate::arm::frames::Pose;
@@ -33,7 +34,8 @@ pub struct Imported {
 /// # Errors
 /// If the file cannot be read or is not the URDF of a serial arm.
 pub fn read(path: &Path, base_link: Option<&str>, tip_link: Option<&str>) -> Result<Imported, UrdfError> {
-    let text = std::fs::read_to_string(path).map_err(|source| UrdfError::Read { path: path.to_owned(), source })?;
+    let text = crate::files::text(path, crate::files::LARGEST_TEXT)
+        .map_err(|source| UrdfError::Read { path: path.to_owned(), source })?;
     import(&text, &path.display().to_string(), base_link, tip_link)
 }
 
@@ -51,7 +53,14 @@ pub fn read(path: &Path, base_link: Option<&str>, tip_link: Option<&str>) -> Res
 /// chain, or if the links do not form a tree from base to tip. The message names the joint or link, the line and a remedy.
 pub fn import(text: &str, origin: &str, base_link: Option<&str>, tip_link: Option<&str>) -> Result<Imported, UrdfError> {
     let outline = outline(text);
-    foreign(text, origin)?;
+    foreign(text, origin, &outline)?;
+    if let Err(Malformed { offset, found, deep: true }) = &outline {
+        // The parser would walk down with its own stack.
+        let elements: &[Element] = &[];
+        let source = Source { text, origin, elements };
+        let allowed = format!("elements within {DEEPEST} others at most");
+        return Err(source.error(Some(line_of(text, *offset)), "", found, allowed, "give the URDF of an arm"));
+    }
     let source = Source { text, origin, elements: outline.as_ref().map_or(&[], |outline| outline.elements.as_slice()) };
     let robot = urdf_rs::read_from_string(text).map_err(|error| source.parse_error(&error, &outline))?;
     let tree = Tree::of(&source, &robot)?;
@@ -60,7 +69,7 @@ pub fn import(text: &str, origin: &str, base_link: Option<&str>, tip_link: Optio
 }
 
 /// Refuses other descriptions of robots, by their names, with what makes a URDF of them.
-fn foreign(text: &str, origin: &str) -> Result<(), UrdfError> {
+fn foreign(text: &str, origin: &str, outline: &Result<Outline, Malformed>) -> Result<(), UrdfError> {
     let root =
         text.match_indices('<').map(|(at, _)| &text[at + 1..]).find(|rest| rest.starts_with(|c: char| c.is_ascii_alphabetic()));
     let tag = root.unwrap_or_default().split(|c: char| !c.is_ascii_alphanumeric()).next().unwrap_or_default();
@@ -76,7 +85,7 @@ fn foreign(text: &str, origin: &str) -> Result<(), UrdfError> {
             "give the URDF or xacro that it was made of; if there is none, write one, joint by joint: only origins, axes and limits are needed",
         ),
         "COLLADA" => ("a COLLADA mesh", "give the URDF that uses it"),
-        "robot" if text.contains("<xacro:") || text.contains("${") => {
+        "robot" if outline.as_ref().is_ok_and(|outline| outline.elements.iter().any(|of| of.tag.starts_with("xacro:"))) => {
             ("a xacro", "expand it: pip install xacro, then xacro robot.urdf.xacro > robot.urdf")
         }
         "" if begins.starts_with("#usda") || begins.starts_with("PXR-USDC") => {
@@ -159,7 +168,7 @@ impl Source<'_> {
                     format!("{} {:?}", element.tag, element.name),
                     found(&error),
                     allowed,
-                    "correct the element",
+                    self.xacro_or("correct the element"),
                 );
             }
         }
@@ -167,7 +176,8 @@ impl Source<'_> {
     }
 
     fn xacro_or(&self, remedy: &'static str) -> &'static str {
-        if self.text.contains("<xacro:") { "expand the xacro first: xacro robot.xacro > robot.urdf" } else { remedy }
+        let is_xacro = self.text.contains("<xacro:") || self.text.contains("${");
+        if is_xacro { "expand the xacro first: pip install xacro, then xacro robot.urdf.xacro > robot.urdf" } else { remedy }
     }
 }
 
@@ -423,6 +433,10 @@ impl<'a> Build<'a> {
             uncollidable: Vec::new(),
             gravity_in_base: Vector3::new(0.0, 0.0, -9.81),
         };
+        if let Some((found, largest)) = too_large(&arm) {
+            let remedy = "check the number: units of a URDF are m, rad and kg";
+            return Err(self.tree.source.error(None, "", found, format!("{largest} at most"), remedy));
+        }
         Ok(Imported { arm, notes: self.notes })
     }
 

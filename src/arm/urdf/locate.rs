@@ -22,11 +22,16 @@ pub(super) struct Outline {
 pub(super) struct Malformed {
     pub(super) offset: usize,
     pub(super) found: String,
+    /// Whether it is XML, but nested deeper than any robot's.
+    pub(super) deep: bool,
 }
+
+/// Elements that may stand within one another.
+pub(super) const DEEPEST: usize = 64;
 
 /// Outlines `text`.
 pub(super) fn outline(text: &str) -> Result<Outline, Malformed> {
-    let malformed = |offset: usize, found: String| Malformed { offset, found };
+    let malformed = |offset: usize, found: String| Malformed { offset, found, deep: false };
     let mut open: Vec<(&str, Range<usize>)> = Vec::new();
     let mut root = None;
     let mut elements = Vec::new();
@@ -66,6 +71,13 @@ pub(super) fn outline(text: &str) -> Result<Outline, Malformed> {
         } else {
             if open.is_empty() && root.is_none() {
                 root = Some(start..end);
+            }
+            if open.len() == DEEPEST {
+                return Err(Malformed {
+                    offset: start,
+                    found: format!("more than {DEEPEST} elements within one another"),
+                    deep: true,
+                });
             }
             open.push((tag, start..end));
         }

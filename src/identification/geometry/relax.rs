@@ -143,6 +143,7 @@ mod tests {
                 scatter: &[],
                 zeros: &[],
                 known: &[],
+                events: robust::Events::LeftOut,
             };
             let loose = fit_at(&arm, of, Sizes::MANUFACTURING).unwrap();
             for sizes in

@@ -21,7 +21,7 @@ use super::standing;
 use crate::arm::frames::Pose;
 use crate::arm::{Arm, ChainAt};
 use crate::measurement::Measurement;
-use crate::measurement::table::Euler;
+use crate::measurement::table::{Euler, MOVED};
 use crate::units::{ANGLES, LENGTHS};
 
 /// Readings that are looked at, spread over all of them.
@@ -129,8 +129,7 @@ pub fn explanations(arm: &Arm, said: &Said, rows: &[&Measurement]) -> Vec<Explan
     if all.is_empty() {
         return Vec::new();
     }
-    let step = all.len().div_ceil(LOOKED_AT).max(1);
-    let few: Vec<Measurement> = all.iter().step_by(step).cloned().collect();
+    let few: Vec<Measurement> = spread(&all).into_iter().cloned().collect();
     let start = Trial { fixes: Vec::new(), left: search.left(&Read::of(&few)), rows: few };
     let enough = |left: &Left| left.share < EXPLAINED && left.share < BETTER * start.left.share;
 
@@ -158,6 +157,16 @@ pub fn explanations(arm: &Arm, said: &Said, rows: &[&Measurement]) -> Vec<Explan
         beam = best_of(longer.collect(), BEAM);
     }
     Vec::new()
+}
+
+/// Some of `rows`, at different configurations: repeats tell nothing new, and every so many rows may be the same pose again.
+fn spread(rows: &[Measurement]) -> Vec<&Measurement> {
+    let mut seen = std::collections::BTreeSet::new();
+    let configuration =
+        |row: &Measurement| -> Vec<i64> { row.joints.iter().map(|value| (value / MOVED).round() as i64).collect() };
+    let different: Vec<&Measurement> = rows.iter().filter(|row| seen.insert(configuration(row))).collect();
+    let step = different.len().div_ceil(LOOKED_AT).max(1);
+    different.into_iter().step_by(step).collect()
 }
 
 /// The readings that have a position; fixed points have none.

@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::super::standing;
-use super::{LOOKED_AT, ROUNDS, in_frame};
+use super::{ROUNDS, in_frame, spread};
 use crate::arm::frames::Pose;
 use crate::arm::mdh::{self, Frame};
 use crate::arm::{Arm, ChainAt, Joint, JointKind};
@@ -183,7 +183,7 @@ pub(super) fn variant(arm: &Arm, rows: &[&Measurement]) -> Option<Variant> {
         return None;
     }
     let whole: Vec<Measurement> = in_frame(rows).into_iter().filter(|row| row.unread == [false; 3]).collect();
-    let few: Vec<&Measurement> = whole.iter().step_by(whole.len().div_ceil(LOOKED_AT).max(1)).collect();
+    let few = spread(&whole);
     let positions: Vec<Vector3<f64>> = few.iter().map(|row| row.position().coords).collect();
     let left = |chain: &ChainAt, senses: usize, rounds: usize| {
         let tools: Vec<Pose> = few

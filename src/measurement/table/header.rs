@@ -1,6 +1,6 @@
 //! The header of a table: what each column is about, and in which unit, under the names that people give them.
 
-use super::{Hints, Needs};
+use super::{Euler, Hints, Needs};
 use crate::units::{ANGLES, LENGTHS, unit_named};
 
 /// What a column is about.
@@ -59,7 +59,7 @@ pub(super) enum Column {
 }
 
 pub(super) const ALLOWED: &str = "pose_id, time_s, q1_rad… (or _deg, _m, _mm, _ticks), x_m, y_m, z_m (or _mm, _inch …), qx, qy, qz, qw, \
-                                  rx_deg, ry_deg, rz_deg (with --euler), r11 … r33, role, target, fixed_point, plane, approach1…, temp_ambient_c, \
+                                  rx_deg, ry_deg, rz_deg (with --euler), rvec_x …, r11 … r33 (or T00 … T33 with T03_m …), role, target, fixed_point, plane, approach1…, temp_ambient_c, \
                                   temp1_c…, payload_kg, dwell_s, session, gravity_x, gravity_y, gravity_z; joints may have their names in \
                                   the robot's file, units may stand in brackets";
 
@@ -73,6 +73,8 @@ pub(super) struct Header {
     pub(super) orientation: Orientation,
     /// Which of x, y, z have a column.
     pub(super) read: [bool; 3],
+    /// What three angles are where their names say it: `rvec_x` is a part of a rotation vector.
+    pub(super) implied: Option<Euler>,
     /// What was taken to be meant.
     pub(super) notes: Vec<String>,
 }
@@ -126,7 +128,18 @@ enum Meant {
     /// A joint without a unit.
     Joint(usize),
     NoUnit(String),
+    /// It counts the rows.
+    Counter,
     Unknown,
+}
+
+/// Row and column of an entry of a matrix: `r11`, `m00`, `t_23`.
+fn entry(base: &str) -> Option<[usize; 2]> {
+    let digits = base.strip_prefix(['r', 'm', 't'])?.trim_start_matches('_').as_bytes();
+    match digits {
+        [row @ b'0'..=b'4', column @ b'0'..=b'4'] => Some([usize::from(row - b'0'), usize::from(column - b'0')]),
+        _ => None,
+    }
 }
 
 /// The number at the end of `text` behind one of `prefixes`.
@@ -139,7 +152,7 @@ fn bare(base: &str) -> &str {
     ["_position", "_pos", "_angle", "_actual", "_rad", "_deg"].iter().find_map(|end| base.strip_suffix(end)).unwrap_or(base)
 }
 
-fn meant(text: &str, joints: &[String], from_zero: bool) -> Meant {
+fn meant(text: &str, joints: &[String], from_zero: bool, matrix_from_zero: bool) -> Meant {
     let Name { base, unit } = Name::of(text);
     let unit = unit.as_deref();
     let own = joints.iter().position(|joint| {
@@ -163,7 +176,8 @@ fn meant(text: &str, joints: &[String], from_zero: bool) -> Meant {
     let axis_of = |prefixes: &[&str], names: [&str; 3]| {
         names.iter().position(|name| prefixes.iter().any(|prefix| base == format!("{prefix}{name}")))
     };
-    let positions = ["", "p", "t", "pos_", "position_", "p_", "t_", "tcp_", "ee_", "translation_", "target_", "measured_"];
+    let positions =
+        ["", "p", "t", "pos_", "position_", "p_", "t_", "tcp_", "ee_", "translation_", "target_", "measured_", "tvec_", "trans_"];
     if let Some(axis) = axis_of(&positions, ["x", "y", "z"]) {
         return match unit.and_then(|unit| unit_named(&LENGTHS, unit).map(|(_, factor)| factor)) {
             Some(factor) => Meant::Column(Column::Position { axis, factor }),
@@ -176,7 +190,11 @@ fn meant(text: &str, joints: &[String], from_zero: bool) -> Meant {
     if let Some(component) = component {
         return Meant::Column(Column::Quaternion { component });
     }
-    let turn = axis_of(&["r", "rot_", "rotvec_", "euler_", "r_"], ["x", "y", "z"])
+    if let (Some(axis), None) = (axis_of(&["rvec_", "rotvec_"], ["x", "y", "z"]), unit) {
+        // OpenCV's and Universal Robots' rotation vectors are in rad.
+        return Meant::Column(Column::Euler { axis, factor: 1.0 });
+    }
+    let turn = axis_of(&["r", "rot_", "rotvec_", "rvec_", "euler_", "r_"], ["x", "y", "z"])
         .or_else(|| ["roll", "pitch", "yaw"].iter().position(|name| base == *name))
         .or_else(|| ["w", "p", "r"].iter().position(|name| base == *name))
         // KUKA: A about z, B about y, C about x.
@@ -187,14 +205,18 @@ fn meant(text: &str, joints: &[String], from_zero: bool) -> Meant {
             None => Meant::NoUnit(format!("{base}_deg or {base}_rad")),
         };
     }
-    let digits: Vec<usize> = base
-        .strip_prefix(['r', 'm'])
-        .unwrap_or_default()
-        .chars()
-        .filter_map(|c| c.to_digit(10).map(|digit| digit as usize))
-        .collect();
-    if let ([row @ 1..=3, column @ 1..=3], 3) = (digits.as_slice(), base.len()) {
-        return Meant::Column(Column::Matrix { row: row - 1, column: column - 1 });
+    if let Some([row, column]) = entry(&base) {
+        let first = usize::from(!matrix_from_zero);
+        return match (row.wrapping_sub(first), column.wrapping_sub(first)) {
+            (row @ 0..3, column @ 0..3) => Meant::Column(Column::Matrix { row, column }),
+            // Of a matrix of four rows the last column is the position, and the last row 0, 0, 0, 1.
+            (axis @ 0..3, 3) => match unit.and_then(|unit| unit_named(&LENGTHS, unit).map(|(_, factor)| factor)) {
+                Some(factor) => Meant::Column(Column::Position { axis, factor }),
+                None => Meant::NoUnit(format!("{base}_m or {base}_mm: it is a position")),
+            },
+            (3, 0..4) => Meant::Column(Column::Ignored),
+            _ => Meant::Unknown,
+        };
     }
     match (base.as_str(), unit) {
         ("time" | "t" | "timestamp" | "stamp" | "datetime" | "date_time", None | Some("s")) => {
@@ -203,6 +225,9 @@ fn meant(text: &str, joints: &[String], from_zero: bool) -> Meant {
         ("time" | "t" | "timestamp" | "stamp", Some("ms")) => Meant::Column(Column::Time { factor: 1e-3 }),
         ("time" | "t" | "timestamp" | "stamp", Some("us")) => Meant::Column(Column::Time { factor: 1e-6 }),
         ("time" | "t" | "timestamp" | "stamp", Some("ns")) => Meant::Column(Column::Time { factor: 1e-9 }),
+        ("sample" | "index" | "idx" | "id" | "no" | "nr" | "number" | "row" | "point" | "measurement" | "reading", None) => {
+            Meant::Counter
+        }
         _ => Meant::Unknown,
     }
 }
@@ -248,13 +273,17 @@ impl Header {
         // `q0 … q5` are six joints.
         let zero = |name: &str| {
             matches!(
-                meant(name, &[], true),
+                meant(name, &[], true, true),
                 Meant::Joint(0) | Meant::Column(Column::Joint { joint: 0, .. } | Column::Ticks { joint: 0 })
             )
         };
         let from_zero =
             names.iter().any(|name| zero(name) && !joints.iter().any(|joint| joint.eq_ignore_ascii_case(name.trim())));
+        let matrix_from_zero = names.iter().filter_map(|name| entry(&Name::of(name).base)).any(|entry| entry.contains(&0));
+        let rotation_vector = |name: &str| ["rvec_", "rotvec_"].iter().any(|prefix| Name::of(name).base.starts_with(prefix));
+        let implied = names.iter().any(rotation_vector).then_some(Euler::Vector);
         let mut notes = Vec::new();
+        let mut counters: Vec<&str> = Vec::new();
         let mut unitless: Vec<&str> = Vec::new();
         let mut columns = Vec::with_capacity(names.len());
         for name in names {
@@ -267,7 +296,7 @@ impl Header {
                 columns.push(column);
                 continue;
             }
-            columns.push(match meant(name, joints, from_zero) {
+            columns.push(match meant(name, joints, from_zero, matrix_from_zero) {
                 Meant::Column(column) => column,
                 // ROS gives joints by their names, in rad and m.
                 Meant::Joint(joint) if joints.iter().any(|known| known.eq_ignore_ascii_case(bare(name.trim()))) => {
@@ -277,6 +306,10 @@ impl Header {
                 Meant::Joint(joint) => {
                     return Err(format!("column `{name}` has no known unit; write q{0}_rad, _deg, _m, _mm or _ticks", joint + 1));
                 }
+                Meant::Counter => {
+                    counters.push(name);
+                    Column::Ignored
+                }
                 Meant::NoUnit(allowed) => return Err(format!("column `{name}` has no known unit; write {allowed}")),
                 Meant::Unknown => return Err(unknown(name)),
             });
@@ -284,10 +317,16 @@ impl Header {
         if !unitless.is_empty() {
             notes.push(format!("columns {} are taken as rad (m of a joint that slides), as ROS has them", unitless.join(", ")));
         }
+        if !counters.is_empty() {
+            notes.push(format!(
+                "column {} is taken to count the rows, and is not read; pose_id says which rows are repeats",
+                counters.join(", ")
+            ));
+        }
         if from_zero {
             notes.push("joint columns are numbered from 0: the first joint is number 0 in the table, and 1 here".to_owned());
         }
-        Header::laid_out(columns, notes, hints.needs)
+        Ok(Header { implied, ..Header::laid_out(columns, notes, hints.needs)? })
     }
 
     fn laid_out(columns: Vec<Column>, notes: Vec<String>, needs: Needs) -> Result<Header, String> {
@@ -364,7 +403,7 @@ impl Header {
             return Err("gravity needs all of gravity_x, gravity_y, gravity_z (m/s²), or none".to_owned());
         }
         let read = of_axes.map(|count| count == 1);
-        Ok(Header { columns, joints, sensors, approaches, orientation, read, notes })
+        Ok(Header { columns, joints, sensors, approaches, orientation, read, implied: None, notes })
     }
 }
 
@@ -439,7 +478,28 @@ mod tests {
             header(&["q1_rad", "x_m", "r11", "r12", "r13", "r21", "r22", "r23", "r31", "r32", "r33"]).unwrap().orientation,
             Orientation::Matrix
         );
+        // OpenCV's, a matrix of four rows counted from zero, and a count of the rows.
+        let board =
+            header(&["sample", "q1_rad", "tvec_x [m]", "tvec_y [m]", "tvec_z [m]", "rvec_x", "rvec_y", "rvec_z"]).unwrap();
+        assert_eq!(
+            (board.orientation, board.implied, board.columns[0]),
+            (Orientation::Euler, Some(Euler::Vector), Column::Ignored)
+        );
+        assert!(board.notes[0].contains("column sample is taken to count the rows"), "{:?}", board.notes);
+        for first in [0, 1] {
+            let entries = (first..first + 4).flat_map(|row| (first..first + 4).map(move |column| (row, column)));
+            let name = |(row, column): (usize, usize)| {
+                let unit = if column == first + 3 && row < first + 3 { " [mm]" } else { "" };
+                format!("T{row}{column}{unit}")
+            };
+            let names: Vec<String> = std::iter::once("q1_rad".to_owned()).chain(entries.map(name)).collect();
+            let whole = header(&names.iter().map(String::as_str).collect::<Vec<_>>()).unwrap();
+            assert_eq!((whole.orientation, whole.read), (Orientation::Matrix, [true; 3]));
+            assert_eq!((whole.columns[1], whole.columns[4]), (Column::Matrix { row: 0, column: 0 }, at(0, 1e-3)));
+            assert_eq!(whole.columns[16], Column::Ignored);
+        }
         for (names, expected) in [
+            (["q1_rad", "T03"], "`T03` has no known unit; write t03_m or t03_mm: it is a position"),
             (["q1", "x_m"], "`q1` has no known unit; write q1_rad, _deg"),
             (["q1_rad", "x"], "`x` has no known unit; write x_m, x_mm"),
             (["q1_rad", "foo"], "unknown column `foo`: rename it, or leave it out with --ignore-columns"),

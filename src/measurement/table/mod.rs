@@ -8,6 +8,7 @@
 //! the comment `# order: unknown` stands in the file.
 
 mod header;
+mod sense;
 mod text;
 
 use std::path::Path;
@@ -44,6 +45,11 @@ pub struct Table {
 pub(crate) const MOVED: f64 = 2e-4;
 
 impl Table {
+    /// Orientations are what they were taken to be from here on: the angles that they were read as are not recorded.
+    pub fn forget_angles(&mut self) {
+        self.measurements.iter_mut().for_each(|row| row.angles_rad = None);
+    }
+
     /// Where no sides of approach were recorded and rows are in the order of measuring, fills them in: a joint comes from where it was in
     /// the row before, or where it stays, from where it came last. Returns whether it did.
     pub fn fill_in_approach(&mut self) -> bool {
@@ -132,7 +138,7 @@ pub enum TableError {
 /// If the file cannot be read, or names the line and what is wrong with it.
 pub fn read_distances(path: impl AsRef<Path>) -> Result<Vec<Distance>, TableError> {
     let file = path.as_ref().display().to_string();
-    let text = std::fs::read_to_string(path.as_ref()).map_err(|source| TableError::Unreadable {
+    let text = crate::files::text(path.as_ref(), crate::files::LARGEST_TABLE).map_err(|source| TableError::Unreadable {
         file: file.clone(),
         source,
         wanted: "a table of distances (.csv)",
@@ -298,7 +304,7 @@ pub fn read_as(path: impl AsRef<Path>, hints: &Hints) -> Result<Table, TableErro
         let message = format!("it has {} MB, and {} are allowed", about.len() >> 20, text::LARGEST_FILE >> 20);
         return Err(unreadable(std::io::Error::other(message)));
     }
-    let bytes = std::fs::read(path).map_err(unreadable)?;
+    let bytes = crate::files::bytes(path, crate::files::LARGEST_TABLE).map_err(unreadable)?;
     let decoded = text::decoded(&bytes).map_err(|(line, message)| TableError::Wrong { file: file.clone(), line, message })?;
     parse_as(&decoded, &file, hints)
 }
@@ -339,7 +345,7 @@ pub fn parse_as(text: &str, file: &str, hints: &Hints) -> Result<Table, TableErr
     let header: csv::StringRecord = if trailing { header.iter().take(header.len() - 1).collect() } else { header };
     let understood = Header::new(&header, &names, &slides, hints).map_err(|message| wrong(header_line, message))?;
     let Header { columns, notes, .. } = &understood;
-    let euler = match (understood.orientation, hints.euler) {
+    let euler = match (understood.orientation, hints.euler.or(understood.implied)) {
         (Orientation::Euler, None) => {
             let message = "three angles make an orientation in many ways: say with --euler which, such as rpy (URDF, ROS), abc (KUKA), wpr \
                            (FANUC), rotvec (Universal Robots) or ZYX";
@@ -358,6 +364,7 @@ pub fn parse_as(text: &str, file: &str, hints: &Hints) -> Result<Table, TableErr
     let mut empty: Vec<(u64, String)> = Vec::new();
 
     let mut measurements: Vec<Measurement> = Vec::new();
+    let mut lines: Vec<u64> = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|error| wrong(error.position().map_or(0, csv::Position::line), error.to_string()))?;
         let line = record.position().map_or(0, csv::Position::line);
@@ -450,7 +457,7 @@ pub fn parse_as(text: &str, file: &str, hints: &Hints) -> Result<Table, TableErr
                 }
                 Column::Temperature { sensor } => {
                     row.temperatures_c[*sensor] =
-                        above_zero_kelvin(number()?).map_err(|what| wrong(line, format!("`{name}` {what}")))?;
+                        sense::temperature(number()?, false).map_err(|what| wrong(line, format!("`{name}` {what}")))?;
                 }
                 Column::Approach { joint } => {
                     row.approach[*joint] = match number()? {
@@ -466,10 +473,11 @@ pub fn parse_as(text: &str, file: &str, hints: &Hints) -> Result<Table, TableErr
                     }
                 }
                 Column::Ambient => {
-                    row.ambient_c = Some(above_zero_kelvin(number()?).map_err(|what| wrong(line, format!("`{name}` {what}")))?)
+                    row.ambient_c =
+                        Some(sense::temperature(number()?, true).map_err(|what| wrong(line, format!("`{name}` {what}")))?)
                 }
                 Column::Payload => {
-                    row.payload_kg = Some(not_negative(number()?).map_err(|what| wrong(line, format!("`{name}` {what}")))?)
+                    row.payload_kg = Some(sense::payload(number()?).map_err(|what| wrong(line, format!("`{name}` {what}")))?)
                 }
                 Column::Dwell => {
                     row.dwell_s = Some(not_negative(number()?).map_err(|what| wrong(line, format!("`{name}` {what}")))?)
@@ -540,6 +548,7 @@ pub fn parse_as(text: &str, file: &str, hints: &Hints) -> Result<Table, TableErr
             }
         }
         measurements.push(row);
+        lines.push(line);
     }
     if measurements.is_empty() && empty.is_empty() {
         return Err(wrong(header_line, "the table has a header but no rows".to_owned()));
@@ -555,6 +564,9 @@ pub fn parse_as(text: &str, file: &str, hints: &Hints) -> Result<Table, TableErr
         let more = if empty.len() > NAMED { format!(" and {} more", empty.len() - NAMED) } else { String::new() };
         let plural = if empty.len() == 1 { "row without a reading is" } else { "rows without a reading are" };
         notes.push(format!("{} {plural} left out: line {}{more}", empty.len(), said.join(", ")));
+    }
+    if columns.iter().any(|column| matches!(column, Column::Time { .. })) {
+        notes.extend(sense::order_of_times(&measurements).map_err(|(row, message)| wrong(lines[row], message))?);
     }
     let first = measurements.iter().map(|row| row.time_s).fold(f64::INFINITY, f64::min);
     if first > SINCE_1970 {
@@ -603,10 +615,6 @@ fn short(text: &str) -> String {
 
 fn not_negative(value: f64) -> Result<f64, String> {
     if value >= 0.0 { Ok(value) } else { Err(format!("is {value}; 0 or more is needed")) }
-}
-
-fn above_zero_kelvin(value: f64) -> Result<f64, String> {
-    if value > -273.15 { Ok(value) } else { Err(format!("is {value} °C; more than -273.15 is needed")) }
 }
 
 /// The column of a joint (from 0).
@@ -839,7 +847,7 @@ mod tests {
             ("q1_rad,q2_rad,x_m,y_m,z_m,approach1\n", "approach1 … approach2: one column per joint, or none"),
             ("q1_rad,x_m,y_m,z_m,payload_kg\n0,0,0,0,-1\n", "line 2: `payload_kg` is -1; 0 or more is needed"),
             ("q1_rad,x_m,y_m,z_m,dwell_s\n0,0,0,0,-1\n", "line 2: `dwell_s` is -1; 0 or more is needed"),
-            ("q1_rad,x_m,y_m,z_m,temp1_c\n0,0,0,0,-300\n", "line 2: `temp1_c` is -300 °C; more than -273.15"),
+            ("q1_rad,x_m,y_m,z_m,temp1_c\n0,0,0,0,-300\n", "line 2: `temp1_c` is -300 °C; from -90 to 200"),
             ("q1_rad,x_m,y_m,z_m,gravity_x\n0,0,0,0,9.81\n", "line 1: gravity needs all of gravity_x, gravity_y, gravity_z"),
             (
                 "q1_rad,x_m,y_m,z_m,gravity_x,gravity_y,gravity_z\n0,0,0,0,1,0,0\n",
