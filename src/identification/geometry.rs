@@ -6,7 +6,10 @@
 
 mod relax;
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
+use rayon::prelude::*;
 
 use super::feature;
 use super::known::{Known, Place};
@@ -25,6 +28,9 @@ use crate::solver::{Fit, Linearised, Problem, STEP_TOLERANCE, Stop, robust, solv
 
 /// Base and target are free: so wide, about where the fit finds them, that it never binds; m and rad.
 pub const FREE: f64 = 50e-3;
+/// Rows that are looked at together, and rows from which on that is shared out.
+const CHUNK: usize = 64;
+const MANY: usize = 512;
 /// Different configurations that a fit needs.
 const CONFIGURATIONS: usize = 6;
 /// Steps that place base and target, and steps of the whole fit.
@@ -854,11 +860,34 @@ impl<'a> Placing<'a> {
     /// Residuals (measured minus predicted, m and rad) and what one sigma of each parameter does to the predictions.
     fn raw(&self, placed: &Placed) -> (DVector<f64>, DMatrix<f64>) {
         let chains = self.chains(placed);
-        let mut residual = DVector::zeros(self.equations.len());
-        let mut jacobian = DMatrix::zeros(self.equations.len(), self.free.len());
+        let (count, width, equations) = (self.readings.measurements.len(), self.free.len(), self.equations.len());
+        let chunks: Vec<Range<usize>> = (0..count).step_by(CHUNK).map(|first| first..(first + CHUNK).min(count)).collect();
+        let of_chunk = |rows: &Range<usize>| self.raw_of(placed, &chains, rows.clone());
+        let parts: Vec<(Vec<f64>, Vec<f64>)> =
+            if count >= MANY { chunks.par_iter().map(of_chunk).collect() } else { chunks.iter().map(of_chunk).collect() };
+        let mut residual = DVector::zeros(equations);
+        let mut jacobian = DMatrix::zeros(equations, width);
+        for (rows, (left, by_equation)) in chunks.iter().zip(&parts) {
+            let first = self.equations.of(rows.start).start;
+            residual.as_mut_slice()[first..first + left.len()].copy_from_slice(left);
+            for (column, values) in jacobian.as_mut_slice().chunks_exact_mut(equations.max(1)).enumerate() {
+                let own = by_equation.iter().skip(column).step_by(width);
+                values[first..first + left.len()].iter_mut().zip(own).for_each(|(to, from)| *to = *from);
+            }
+        }
+        (residual, jacobian)
+    }
+
+    /// [`Placing::raw`] of some rows, equation by equation.
+    fn raw_of(&self, placed: &Placed, chains: &[(ChainAt, Vec<Option<usize>>)], rows: Range<usize>) -> (Vec<f64>, Vec<f64>) {
         let columns = FrameErrors::PER_FRAME * (self.frames.frames() + 2);
         let mut buffer = vec![0.0; COMPONENTS * columns];
-        for (row, measurement) in self.readings.measurements.iter().enumerate() {
+        let width = self.free.len();
+        let first = self.equations.of(rows.start).start;
+        let total = self.equations.of(rows.end - 1).end - first;
+        let (mut residual, mut jacobian) = (vec![0.0; total], vec![0.0; total * width]);
+        for row in rows {
+            let measurement = self.readings.measurements[row];
             let (chain, place) = &chains[self.chain_of(row)];
             let (axes, origin) = chain.jacobian_into(&measurement.joints, &mut buffer, columns);
             let error = self.difference(row, placed, pose_from_parts(&axes, &origin));
@@ -873,16 +902,18 @@ impl<'a> Placing<'a> {
             turn_to_residual(&mut buffer[3 * columns..], columns, &error.fixed_rows::<3>(3).into_owned());
             for equation in self.equations.of(row) {
                 let component = self.equations.component(equation);
-                residual[equation] = error[component];
+                let at = equation - first;
+                residual[at] = error[component];
+                let own = &mut jacobian[at * width..(at + 1) * width];
                 for (value, place) in buffer[component * columns..(component + 1) * columns].iter().zip(place) {
                     if let Some(column) = place {
-                        jacobian[(equation, *column)] = value * self.sigma[*column];
+                        own[*column] = value * self.sigma[*column];
                     }
                 }
                 if let (Some(feature), 0..3) = (self.feature[row], component) {
                     for unknown in 0..feature::UNKNOWNS {
                         let column = self.first_of_features() + feature::UNKNOWNS * feature + unknown;
-                        jacobian[(equation, column)] = of_feature[(component, unknown)] * self.sigma[column];
+                        own[column] = of_feature[(component, unknown)] * self.sigma[column];
                     }
                 }
             }

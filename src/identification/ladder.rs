@@ -20,9 +20,6 @@ use crate::solver::robust;
 const FOLDS: usize = 10;
 /// Standard errors by which a rung must predict better: a nominal arm seldom does by luck.
 const BEYOND_CHANCE: f64 = 2.0;
-/// Sizes from which the readings' choice begins: zeros of several degrees are found, lengths and turns are those of manufacturing.
-const LOOSE: Sizes = Sizes { zeros: 10.0, lengths: 1.0, turns: 1.0 };
-
 /// What is let loose on a rung of the ladder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -91,7 +88,7 @@ pub struct Climbed {
 /// # Errors
 /// If the readings cannot tell.
 pub fn climb(arm: &Arm, readings: Readings<'_>, only: Option<Freedom>) -> Result<Climbed, GeometryError> {
-    let loose = fit_roughly(arm, readings, LOOSE)?;
+    let loose = fit_roughly(arm, readings, Sizes::MANUFACTURING)?;
     let likeliest = loose.likeliest_sizes();
     // Rows that are far off for the whole geometry are for every part of it.
     let counts = loose.equations.counts();

@@ -1,9 +1,14 @@
 //! Products of nalgebra's matrices, column by column in a fixed order, several sums side by side that the compiler keeps in vectors.
 
+use std::ops::Range;
+
 use nalgebra::{Cholesky, DMatrix};
+use rayon::prelude::*;
 
 /// Rows of a panel that stays in the cache while all its columns are multiplied with each other.
 const PANEL: usize = 256;
+/// Panels from which on they are shared out.
+const MANY: usize = 8;
 
 /// `matrixᵀ matrix`.
 #[must_use]
@@ -40,37 +45,54 @@ fn add_products(left: &DMatrix<f64>, right: &DMatrix<f64>, lower: bool, product:
     assert_eq!(left.nrows(), right.nrows(), "a product of matrices");
     let rows = left.nrows();
     let (left, right) = (left.as_slice(), right.as_slice());
+    let shape = product.shape();
+    let panels: Vec<Range<usize>> = (0..rows).step_by(PANEL).map(|from| from..(from + PANEL).min(rows)).collect();
+    if panels.len() < MANY {
+        panels.into_iter().for_each(|panel| add_panel(left, right, rows, panel, lower, product));
+        return;
+    }
+    // Each panel's own, added in order: the same sums as one after the other.
+    let own: Vec<DMatrix<f64>> = panels
+        .into_par_iter()
+        .map(|panel| {
+            let mut own = DMatrix::zeros(shape.0, shape.1);
+            add_panel(left, right, rows, panel, lower, &mut own);
+            own
+        })
+        .collect();
+    own.iter().for_each(|own| *product += own);
+}
+
+/// Adds what the rows of `panel` have in it; `left` and `right` have `rows` of them.
+fn add_panel(left: &[f64], right: &[f64], rows: usize, panel: Range<usize>, lower: bool, product: &mut DMatrix<f64>) {
     let (lefts, rights) = product.shape();
-    for from in (0..rows).step_by(PANEL) {
-        let to = (from + PANEL).min(rows);
-        let of = |column: usize| column * rows + from..column * rows + to;
-        let mut j = 0;
-        while j < rights {
-            // Two by four columns at a time share what is loaded.
-            let two = j + 1 < rights;
-            let b0 = &right[of(j)];
-            let b1 = &right[of(if two { j + 1 } else { j })];
-            let mut i = if lower { j } else { 0 };
-            while i + 4 <= lefts {
-                let a = [0, 1, 2, 3].map(|k| &left[of(i + k)]);
-                let sums = eight_dots(a, [b0, b1]);
-                for k in 0..4 {
-                    product[(i + k, j)] += sums[0][k];
-                    if two {
-                        product[(i + k, j + 1)] += sums[1][k];
-                    }
-                }
-                i += 4;
-            }
-            for i in i..lefts {
-                let a = &left[of(i)];
-                product[(i, j)] += super::dense::dot(a, b0);
+    let of = |column: usize| column * rows + panel.start..column * rows + panel.end;
+    let mut j = 0;
+    while j < rights {
+        // Two by four columns at a time share what is loaded.
+        let two = j + 1 < rights;
+        let b0 = &right[of(j)];
+        let b1 = &right[of(if two { j + 1 } else { j })];
+        let mut i = if lower { j } else { 0 };
+        while i + 4 <= lefts {
+            let a = [0, 1, 2, 3].map(|k| &left[of(i + k)]);
+            let sums = eight_dots(a, [b0, b1]);
+            for k in 0..4 {
+                product[(i + k, j)] += sums[0][k];
                 if two {
-                    product[(i, j + 1)] += super::dense::dot(a, b1);
+                    product[(i + k, j + 1)] += sums[1][k];
                 }
             }
-            j += 2;
+            i += 4;
         }
+        for i in i..lefts {
+            let a = &left[of(i)];
+            product[(i, j)] += super::dense::dot(a, b0);
+            if two {
+                product[(i, j + 1)] += super::dense::dot(a, b1);
+            }
+        }
+        j += 2;
     }
 }
 
@@ -116,7 +138,7 @@ mod tests {
     #[test]
     fn products_are_nalgebras() {
         let mut stream = stream(1, "test/numerics");
-        for (rows, left, right) in [(1, 1, 1), (7, 3, 5), (300, 13, 6), (600, 9, 2), (513, 4, 1)] {
+        for (rows, left, right) in [(1, 1, 1), (7, 3, 5), (300, 13, 6), (600, 9, 2), (513, 4, 1), (3001, 9, 5)] {
             let a = DMatrix::from_fn(rows, left, |_, _| stream.normal());
             let b = DMatrix::from_fn(rows, right, |_, _| stream.normal());
             assert!((transposed_product(&a, &b) - a.transpose() * &b).norm() < 1e-10);

@@ -1,6 +1,9 @@
 //! One least squares for everything that is fitted: Gauss–Newton, damped after Levenberg and Marquardt where a step fails, with a
 //! Gaussian prior on the parameters where there is one (by normal equations), else by QR.
 //!
+//! Where a step along a valley fails because the valley bends, it is corrected to second order by what it was seen to miss (Transtrum and
+//! Sethna 2012, geodesic acceleration, taken from the failed step itself).
+//!
 //! What is minimised is the sum of squares of a problem's weighted residuals and of the departures of its parameters from where the
 //! prior has them, both in sigmas. A step that raises it is never taken.
 
@@ -131,8 +134,21 @@ pub fn solve_from<P: Problem>(problem: &P, columns: &[usize], start: P::Point, h
             return Fit { point, linearised: here, stop: Stop::Singular, steps: step_number };
         };
         let change = (jacobian * &step).norm();
-        let trial = problem.moved(&point, columns, &step);
-        let there = problem.linearise(&trial);
+        let mut trial = problem.moved(&point, columns, &step);
+        let mut there = problem.linearise(&trial);
+        if there.cost() > cost {
+            // A valley that bends: what the step missed by bending, taken back.
+            let bent = &there.residuals - &here.residuals + jacobian * &step;
+            let none = departures.as_ref().map(|departures| DVector::zeros(departures.len()));
+            let back = self::step(jacobian, &bent, none.as_ref(), damping).filter(|back| back.norm() <= step.norm());
+            if let Some(back) = back {
+                let corrected = problem.moved(&point, columns, &(&step + back));
+                let problem_there = problem.linearise(&corrected);
+                if problem_there.cost() < there.cost() {
+                    (trial, there) = (corrected, problem_there);
+                }
+            }
+        }
         let trial_cost = there.cost();
         let sigma = (cost / here.residuals.len() as f64).sqrt().max(problem.one_sigma());
         let settled = change <= problem.tolerance() * sigma;
@@ -305,6 +321,37 @@ mod tests {
         let bent = Bent { matrix: DMatrix::identity(2, 2), right: DVector::from_row_slice(&[5.0, 7.0]), bend: 0.1, prior: false };
         let fit = solve(&bent, &[0, 1], DVector::zeros(2), 1);
         assert_eq!((fit.stop, fit.stop.to_string().as_str()), (Stop::StepLimit(1), "not settled after 1 steps"));
+    }
+
+    /// Rosenbrock's valley, a thousand times as steep as it is long.
+    struct Valley;
+
+    impl Problem for Valley {
+        type Point = [f64; 2];
+
+        fn linearise(&self, at: &[f64; 2]) -> Linearised {
+            let [x, y] = *at;
+            Linearised {
+                residuals: DVector::from_row_slice(&[-1e3 * (y - x * x), 1.0 - x]),
+                jacobian: DMatrix::from_row_slice(2, 2, &[-2e3 * x, 1e3, 1.0, 0.0]),
+                departures: None,
+            }
+        }
+
+        fn moved(&self, from: &[f64; 2], _: &[usize], step: &DVector<f64>) -> [f64; 2] {
+            [from[0] + step[0], from[1] + step[1]]
+        }
+
+        fn one_sigma(&self) -> f64 {
+            1.0
+        }
+    }
+
+    #[test]
+    fn a_valley_that_bends_is_followed() {
+        let fit = solve(&Valley, &[0, 1], [-1.0, 1.0], 60);
+        assert!(fit.converged() && fit.steps < 10, "{} steps", fit.steps);
+        assert!((fit.point[0] - 1.0).abs() < 1e-6 && (fit.point[1] - 1.0).abs() < 1e-6, "{:?}", fit.point);
     }
 
     proptest! {

@@ -17,6 +17,9 @@ use crate::arm::{Chain, Joint, JointKind, Mimic, Step};
 /// Radius of the ball whose inertia a link gets that has an impossible one, m.
 const BALL_M: f64 = 0.05;
 
+/// Joints beside the chain that are named.
+const NAMED: usize = 6;
+
 /// Largest number of an origin, m or rad, that is taken for meant.
 const LARGEST: f64 = 1000.0;
 
@@ -363,12 +366,14 @@ struct Build<'a> {
     chain: Chain,
     /// Links of which meshes were skipped.
     with_meshes: Vec<String>,
+    /// Joints beside the chain.
+    frozen: Vec<&'a str>,
     notes: Vec<String>,
 }
 
 impl<'a> Build<'a> {
     fn new(tree: &'a Tree<'a>, base: &'a str, path: &'a [&'a urdf_rs::Joint]) -> Self {
-        Build { tree, path, base, chain: Chain::new(), with_meshes: Vec::new(), notes: Vec::new() }
+        Build { tree, path, base, chain: Chain::new(), with_meshes: Vec::new(), frozen: Vec::new(), notes: Vec::new() }
     }
 
     fn run(mut self) -> Result<Imported, UrdfError> {
@@ -415,6 +420,12 @@ impl<'a> Build<'a> {
             self.push_tool([0.0; 3], [0.0; 3], name);
         }
         let links = links.into_iter().map(|(name, bodies)| self.link(name, &bodies)).collect::<Result<Vec<Link>, UrdfError>>()?;
+        if !self.frozen.is_empty() {
+            let more = if self.frozen.len() > NAMED { format!(" and {} more", self.frozen.len() - NAMED) } else { String::new() };
+            let names: Vec<&str> = self.frozen.iter().take(NAMED).copied().collect();
+            let (what, is) = if self.frozen.len() == 1 { ("joint", "is") } else { ("joints", "are") };
+            self.notes.push(format!("{what} {}{more} {is} not in the chain, and frozen at 0", names.join(", ")));
+        }
         if !self.with_meshes.is_empty() {
             let names = self.with_meshes.join(", ");
             self.notes.push(format!("meshes are skipped, so that collisions of these links are not seen: {names}"));
@@ -540,8 +551,7 @@ impl<'a> Build<'a> {
                     continue;
                 }
                 if joint.joint_type != JointType::Fixed {
-                    let (child, joint) = (&joint.child.link, &joint.name);
-                    self.notes.push(format!("joint {joint} is not in the chain: {child} is frozen where the joint is at 0"));
+                    self.frozen.push(&joint.name);
                 }
                 open.push((&joint.child.link, link_from_body * self.origin(joint)?));
             }

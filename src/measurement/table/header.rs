@@ -212,7 +212,7 @@ fn meant(text: &str, joints: &[String], from_zero: bool, matrix_from_zero: bool)
             // Of a matrix of four rows the last column is the position, and the last row 0, 0, 0, 1.
             (axis @ 0..3, 3) => match unit.and_then(|unit| unit_named(&LENGTHS, unit).map(|(_, factor)| factor)) {
                 Some(factor) => Meant::Column(Column::Position { axis, factor }),
-                None => Meant::NoUnit(format!("{base}_m or {base}_mm: it is a position")),
+                None => Meant::NoUnit(format!("{0}_m or {0}_mm: it is a position", text.trim())),
             },
             (3, 0..4) => Meant::Column(Column::Ignored),
             _ => Meant::Unknown,
@@ -499,7 +499,7 @@ mod tests {
             assert_eq!(whole.columns[16], Column::Ignored);
         }
         for (names, expected) in [
-            (["q1_rad", "T03"], "`T03` has no known unit; write t03_m or t03_mm: it is a position"),
+            (["q1_rad", "T03"], "`T03` has no known unit; write T03_m or T03_mm: it is a position"),
             (["q1", "x_m"], "`q1` has no known unit; write q1_rad, _deg"),
             (["q1_rad", "x"], "`x` has no known unit; write x_m, x_mm"),
             (["q1_rad", "foo"], "unknown column `foo`: rename it, or leave it out with --ignore-columns"),
