@@ -243,7 +243,7 @@ fn thinned<'a>(measurements: &[&'a Measurement]) -> Vec<&'a Measurement> {
         let own = stride.min(counts.get(&key).map_or(1, |count| count / OF_EACH)).max(1);
         let number = seen.entry(key).or_default();
         *number += 1;
-        (*number - 1) % own == 0
+        (*number - 1).is_multiple_of(own)
     };
     measurements.iter().filter(|row| kept(row)).copied().collect()
 }
