@@ -1,8 +1,9 @@
-//! Reading what people give: regular files of a size that can be meant. A pipe or a device may never end.
+//! Files: what people give is read if it is a regular one of a size that can be meant (a pipe or a device may never end); what is written
+//! goes aside first.
 
 use std::fs::File;
 use std::io::{Error, ErrorKind, Read, Result};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Largest text of a robot, a scene or a grid, bytes.
 pub const LARGEST_TEXT: u64 = 64 << 20;
@@ -17,7 +18,7 @@ pub fn open(path: &Path, largest: u64) -> Result<File> {
     // Looked at first: to open a pipe is to wait for whoever writes into it.
     let about = std::fs::metadata(path)?;
     if about.is_dir() {
-        return Err(Error::from(ErrorKind::IsADirectory));
+        return Err(Error::new(ErrorKind::IsADirectory, "Is a directory"));
     }
     if !about.is_file() {
         return Err(Error::new(ErrorKind::InvalidInput, "it is a pipe or a device, and a file is needed"));
@@ -52,9 +53,77 @@ pub fn text(path: &Path, largest: u64) -> Result<String> {
     })
 }
 
+/// Refuses to write through a link that stands where a file of ours is to be: it would be another file's end.
+///
+/// # Errors
+/// If `path` is a symbolic link.
+pub fn no_link(path: &Path) -> Result<()> {
+    match std::fs::symlink_metadata(path) {
+        Ok(about) if about.file_type().is_symlink() => Err(Error::new(
+            ErrorKind::AlreadyExists,
+            "a symbolic link stands there: remove it, or choose another folder with --out",
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// A file that is gone when this is dropped, unless it is kept.
+#[derive(Debug)]
+pub struct Aside {
+    path: PathBuf,
+    kept: bool,
+}
+
+impl Aside {
+    /// Makes the file at `path` anew.
+    ///
+    /// # Errors
+    /// If it cannot be made.
+    pub fn create(path: &Path) -> Result<(Aside, File)> {
+        no_link(path)?;
+        let file = File::create(path)?;
+        Ok((Aside { path: path.to_owned(), kept: false }, file))
+    }
+
+    /// Renames it to `path`: it is whole.
+    ///
+    /// # Errors
+    /// If it cannot be renamed.
+    pub fn become_of(mut self, path: &Path) -> Result<()> {
+        std::fs::rename(&self.path, path)?;
+        self.kept = true;
+        Ok(())
+    }
+}
+
+impl Drop for Aside {
+    fn drop(&mut self) {
+        if !self.kept {
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_written_aside_is_gone_or_whole_and_no_link_is_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        let (aside, whole) = (folder.path().join("a.partial"), folder.path().join("a"));
+        drop(Aside::create(&aside).unwrap());
+        assert!(!aside.exists());
+        Aside::create(&aside).unwrap().0.become_of(&whole).unwrap();
+        assert!(whole.exists() && !aside.exists());
+        #[cfg(unix)]
+        {
+            std::fs::write(&whole, "precious").unwrap();
+            std::os::unix::fs::symlink(&whole, &aside).unwrap();
+            assert!(Aside::create(&aside).unwrap_err().to_string().contains("a symbolic link"));
+            assert_eq!(std::fs::read(&whole).unwrap(), b"precious");
+        }
+    }
 
     #[test]
     fn files_of_other_kinds_and_sizes_are_refused() {

@@ -80,7 +80,8 @@ impl TruthFile {
     /// If it cannot be read or is something else.
     pub fn read(path: &Path) -> Result<TruthFile, TruthFileError> {
         let file = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|source| TruthFileError::Unreadable { file: file.clone(), source })?;
+        let text = crate::files::text(path, crate::files::LARGEST_TEXT)
+            .map_err(|source| TruthFileError::Unreadable { file: file.clone(), source })?;
         toml::from_str(&text).map_err(|error| TruthFileError::Foreign { file, reason: error.to_string().trim_end().to_owned() })
     }
 }
@@ -93,10 +94,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut partial = path.as_os_str().to_owned();
     partial.push(".partial");
     let partial = std::path::PathBuf::from(partial);
-    let written = std::fs::write(&partial, bytes).and_then(|()| std::fs::rename(&partial, path));
-    if written.is_err() {
-        // The error that is told is the first one.
-        let _ = std::fs::remove_file(&partial);
-    }
-    written
+    let (aside, mut file) = crate::files::Aside::create(&partial)?;
+    std::io::Write::write_all(&mut file, bytes)?;
+    aside.become_of(path)
 }

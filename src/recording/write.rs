@@ -97,6 +97,7 @@ impl Recorder {
             return Err(output("replace", &finished, io::ErrorKind::IsADirectory.into()));
         }
         let create = |source| output("create", &partial, source);
+        crate::files::no_link(&partial).map_err(create)?;
         let file = OpenOptions::new().write(true).create(true).truncate(false).open(&partial).map_err(create)?;
         // A file system that knows no locks must not keep anyone from recording.
         if let Err(TryLockError::WouldBlock) = file.try_lock() {

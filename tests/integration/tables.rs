@@ -163,7 +163,7 @@ fn touched_planes_calibrate_an_arm() {
     let nominal = cell.robot.clone();
     let (before, after) = (cell.off(&nominal), cell.off(&calibrated));
     assert!(after < 0.6 * before, "{after} of {before} mm");
-    // Its size is what the file says; a dozen measured positions, which alone tell little, tell that.
+    // Its size is what the file says; a dozen measured positions tell that, and are better with the touches than alone.
     let measured = cell.rows(12, |_| tip);
     let alone = cell.write("few.csv", &csv(&measured));
     cell.identified(&alone, &[]);
@@ -178,7 +178,7 @@ fn touched_planes_calibrate_an_arm() {
     let both = cell.write("both.csv", &both);
     cell.identified(&both, &[]);
     let together = cell.off(&together);
-    assert!(together < 0.25 * before && together < 0.5 * few, "{before} {after} {few} {together}");
+    assert!(together < 0.05 * before && together < 0.9 * few, "{before} {after} {few} {together}");
     let robot = cell.robot.to_str().unwrap();
     let diagnosed = kincal(cell.folder.path(), &["diagnose", &table, "--robot", robot, "--position-noise-um", "20", "--json"]);
     assert!(diagnosed.code != Some(2), "{}", diagnosed.stderr);

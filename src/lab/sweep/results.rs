@@ -9,6 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::grid::Cell;
+use crate::files::Aside;
 
 /// First field of the header.
 pub const FORMAT: &str = "kincal sweep 1";
@@ -365,7 +366,7 @@ pub fn merge(parts: &[PathBuf], out: &Path) -> Result<std::ops::Range<u64>, Resu
     if let Some(folder) = out.parent() {
         std::fs::create_dir_all(folder).map_err(io("make the folder of", out))?;
     }
-    let file = File::create(&partial).map_err(io("write", &partial))?;
+    let (aside, file) = Aside::create(&partial).map_err(io("write", &partial))?;
     let mut writer = io::BufWriter::new(file);
     writer.write_all(&line(&header).map_err(ResultsError::Parts)?).map_err(io("write", &partial))?;
     let place = |record: &Record| record.trial * cells + record.cell as u64;
@@ -423,14 +424,8 @@ pub fn merge(parts: &[PathBuf], out: &Path) -> Result<std::ops::Range<u64>, Resu
         None => Err(ResultsError::Parts("the parts hold no finished trial".to_owned())),
     });
     let written = writer.into_inner().map_err(|error| error.into_error()).and_then(|file| file.sync_all());
-    let trials = finished.and_then(|trials| {
-        written.map_err(io("write", &partial))?;
-        std::fs::rename(&partial, out).map_err(io("write", out))?;
-        Ok(trials)
-    });
-    if trials.is_err() {
-        // The error that is told is the first one.
-        let _ = std::fs::remove_file(&partial);
-    }
-    trials
+    let trials = finished?;
+    written.map_err(io("write", &partial))?;
+    aside.become_of(out).map_err(io("write", out))?;
+    Ok(trials)
 }

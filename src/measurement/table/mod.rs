@@ -364,7 +364,6 @@ pub fn parse_as(text: &str, file: &str, hints: &Hints) -> Result<Table, TableErr
     let mut empty: Vec<(u64, String)> = Vec::new();
 
     let mut measurements: Vec<Measurement> = Vec::new();
-    let mut lines: Vec<u64> = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|error| wrong(error.position().map_or(0, csv::Position::line), error.to_string()))?;
         let line = record.position().map_or(0, csv::Position::line);
@@ -548,7 +547,6 @@ pub fn parse_as(text: &str, file: &str, hints: &Hints) -> Result<Table, TableErr
             }
         }
         measurements.push(row);
-        lines.push(line);
     }
     if measurements.is_empty() && empty.is_empty() {
         return Err(wrong(header_line, "the table has a header but no rows".to_owned()));
@@ -566,7 +564,7 @@ pub fn parse_as(text: &str, file: &str, hints: &Hints) -> Result<Table, TableErr
         notes.push(format!("{} {plural} left out: line {}{more}", empty.len(), said.join(", ")));
     }
     if columns.iter().any(|column| matches!(column, Column::Time { .. })) {
-        notes.extend(sense::order_of_times(&measurements).map_err(|(row, message)| wrong(lines[row], message))?);
+        notes.extend(sense::order_of_times(&measurements));
     }
     let first = measurements.iter().map(|row| row.time_s).fold(f64::INFINITY, f64::min);
     if first > SINCE_1970 {

@@ -46,27 +46,25 @@ pub(super) fn payload(value: f64) -> Result<f64, String> {
 }
 
 /// What is to be said where the times of `rows`, in their order in the file, go back within a session.
-///
-/// # Errors
-/// If they run backwards altogether.
-pub(super) fn order_of_times(rows: &[Measurement]) -> Result<Option<String>, (usize, String)> {
+pub(super) fn order_of_times(rows: &[Measurement]) -> Option<String> {
     let steps = rows.windows(2).filter(|pair| pair[0].session == pair[1].session).count();
     let back: Vec<usize> = (1..rows.len())
         .filter(|row| rows[*row].session == rows[row - 1].session && rows[*row].time_s < rows[row - 1].time_s)
         .collect();
-    let Some(first) = back.first() else {
-        return Ok(None);
-    };
+    let first = back.first()?;
     if 2 * back.len() > steps {
-        let message = "time runs backwards from row to row: is it what is left, or are the rows in the other order?".to_owned();
-        return Err((*first, message));
+        return Some(
+            "time runs backwards from row to row: rows are taken in the order of their times, the last one first; if they stand in the \
+             order of measuring, the clock is wrong: leave it out with --ignore-columns"
+                .to_owned(),
+        );
     }
     let more = if back.len() > 1 { format!(" and {} more", back.len() - 1) } else { String::new() };
-    Ok(Some(format!(
+    Some(format!(
         "time goes back at reading {}{more}: rows are taken in the order of their times; sessions with clocks of their own need labels in a \
          column `session`",
         first + 1
-    )))
+    ))
 }
 
 #[cfg(test)]
@@ -87,8 +85,8 @@ mod tests {
         let at = |times: &[f64]| -> Vec<Measurement> {
             times.iter().map(|time_s| Measurement { time_s: *time_s, ..Measurement::default() }).collect()
         };
-        assert_eq!(order_of_times(&at(&[0.0, 1.0, 1.0, 2.0])), Ok(None));
-        assert!(order_of_times(&at(&[0.0, 1.0, 0.5, 2.0])).unwrap().unwrap().contains("at reading 3"));
-        assert_eq!(order_of_times(&at(&[3.0, 2.0, 1.0])).unwrap_err().0, 1);
+        assert_eq!(order_of_times(&at(&[0.0, 1.0, 1.0, 2.0])), None);
+        assert!(order_of_times(&at(&[0.0, 1.0, 0.5, 2.0])).unwrap().contains("at reading 3"));
+        assert!(order_of_times(&at(&[3.0, 2.0, 1.0])).unwrap().contains("time runs backwards"));
     }
 }
