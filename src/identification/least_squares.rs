@@ -517,6 +517,10 @@ impl<'a> Plain<'a> {
             let rows = (0..self.measurements.len()).filter(|row| self.measurements[*row].feature().as_ref() == Some(of));
             let own: Vec<(usize, usize)> =
                 rows.flat_map(|row| self.equations.of_position(row).map(move |equation| (row, equation))).collect();
+            if own.is_empty() {
+                // Only readings that are held out were there.
+                continue;
+            }
             let by_unknown = DMatrix::from_fn(own.len(), feature::UNKNOWNS, |at, unknown| {
                 let (row, equation) = own[at];
                 self.weights[equation] * feature::derivative(of, &targets[row])[(self.equations.component(equation), unknown)]

@@ -179,6 +179,13 @@ fn touched_planes_calibrate_an_arm() {
     cell.identified(&both, &[]);
     let together = cell.off(&together);
     assert!(together < 0.05 * before && together < 0.9 * few, "{before} {after} {few} {together}");
+    // A plate whose touches are all held out is laid where the calibrated arm has them.
+    let held =
+        text.replace(",plane\n", ",plane,role\n").replace("plate 0\n", "plate 0,fit\n").replace("plate 1\n", "plate 1,fit\n");
+    let held = cell.write("held.csv", &held.replace("plate 2\n", "plate 2,held_out\n"));
+    let json = cell.identified(&held, &[]);
+    let (before, after) = (number(&json, "/held_out_nominal/position_m/rms"), number(&json, "/held_out/position_m/rms"));
+    assert!(after < before, "{after} of {before} m");
     let robot = cell.robot.to_str().unwrap();
     let diagnosed = kincal(cell.folder.path(), &["diagnose", &table, "--robot", robot, "--position-noise-um", "20", "--json"]);
     assert!(diagnosed.code != Some(2), "{}", diagnosed.stderr);
