@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 /// Largest text of a robot, a scene or a grid, bytes.
 pub const LARGEST_TEXT: u64 = 64 << 20;
-/// Largest table, bytes.
-pub const LARGEST_TABLE: u64 = 2 << 30;
+/// Largest table, bytes: a million readings with everything that a table may have.
+pub const LARGEST_TABLE: u64 = 1 << 30;
 
 /// Opens the regular file at `path`, of `largest` bytes at most.
 ///
@@ -21,7 +21,7 @@ pub fn open(path: &Path, largest: u64) -> Result<File> {
         return Err(Error::new(ErrorKind::IsADirectory, "Is a directory"));
     }
     if !about.is_file() {
-        return Err(Error::new(ErrorKind::InvalidInput, "it is a pipe or a device, and a file is needed"));
+        return Err(Error::new(ErrorKind::InvalidInput, "it is no regular file, but a pipe or a device"));
     }
     if about.len() > largest {
         let (found, most) = (about.len() >> 20, largest >> 20);
@@ -135,6 +135,6 @@ mod tests {
         assert_eq!(bytes(&path, 100).unwrap().len(), 7);
         assert!(open(folder.path(), 100).is_err());
         #[cfg(unix)]
-        assert!(open(Path::new("/dev/zero"), 100).unwrap_err().to_string().contains("a pipe or a device"));
+        assert!(open(Path::new("/dev/zero"), 100).unwrap_err().to_string().contains("no regular file"));
     }
 }

@@ -192,6 +192,11 @@ fn touched_planes_calibrate_an_arm() {
     assert_eq!(diagnosed.json()["effects"].as_array().unwrap().len(), 0);
     let wrong = format!("{HEAD},x_m,y_m,z_m,plane\n0,0,0,0,0,0,1,2,3,a\n");
     let wrong = cell.write("wrong.csv", &wrong);
+    // Lines are counted as an editor does, whatever ends them.
+    let lines =
+        cell.write("lines.csv", "q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,x_m\r\n0,0,0,0,0,0,1\r\n0,0,0,0,0,0,\"1,5\"\r\n");
+    let refused_line = kincal(cell.folder.path(), &["identify", &lines, "--robot", robot]).ends(2);
+    assert!(refused_line.stderr.contains("line 3: `x_m` is `1,5`"), "{}", refused_line.stderr);
     let refused = kincal(cell.folder.path(), &["identify", &wrong, "--robot", robot]).ends(2);
     assert!(refused.stderr.contains("line 2: a position and the plane `a`"), "{}", refused.stderr);
 }

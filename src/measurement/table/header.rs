@@ -311,7 +311,7 @@ impl Header {
                     Column::Ignored
                 }
                 Meant::NoUnit(allowed) => return Err(format!("column `{name}` has no known unit; write {allowed}")),
-                Meant::Unknown => return Err(unknown(name)),
+                Meant::Unknown => return Err(unknown(name, joints)),
             });
         }
         if !unitless.is_empty() {
@@ -408,15 +408,19 @@ impl Header {
 }
 
 /// Why `name` is no column.
-fn unknown(name: &str) -> String {
+fn unknown(name: &str, joints: &[String]) -> String {
     match name {
+        _ if name.split_whitespace().count() > 3 && !name.contains(['[', '(']) => {
+            "columns that are separated by blanks: separate them by commas, semicolons or tabs".to_owned()
+        }
         "" => "a column without a name: is there a separator at the end of the line?".to_owned(),
         _ if name.replace(',', ".").parse::<f64>().is_ok() => {
             format!("a number (`{name}`) where the names of the columns should be: the header is missing")
         }
         _ => {
             let short: String = name.chars().take(60).collect();
-            format!("unknown column `{short}`: rename it, or leave it out with --ignore-columns; known are {ALLOWED}")
+            let own = if joints.is_empty() { String::new() } else { format!("; those of this robot are {}", joints.join(", ")) };
+            format!("unknown column `{short}`: rename it, or leave it out with --ignore-columns; known are {ALLOWED}{own}")
         }
     }
 }
@@ -503,6 +507,8 @@ mod tests {
             (["q1", "x_m"], "`q1` has no known unit; write q1_rad, _deg"),
             (["q1_rad", "x"], "`x` has no known unit; write x_m, x_mm"),
             (["q1_rad", "foo"], "unknown column `foo`: rename it, or leave it out with --ignore-columns"),
+            (["q1_rad", "foo"], "those of this robot are shoulder_pan_joint, elbow_joint"),
+            (["q1_rad q2_rad x_m y_m z_m", "foo"], "separated by blanks"),
             (["q1_rad", "1.5"], "the header is missing"),
         ] {
             let error = header(&names).unwrap_err();

@@ -296,15 +296,10 @@ pub fn read_as(path: impl AsRef<Path>, hints: &Hints) -> Result<Table, TableErro
     let file = path.display().to_string();
     let unreadable =
         |source: std::io::Error| TableError::Unreadable { file: file.clone(), source, wanted: "a table of measurements (.csv)" };
-    let about = std::fs::metadata(path).map_err(unreadable)?;
-    if !about.is_file() {
-        return Err(unreadable(std::io::Error::other("it is no regular file")));
-    }
-    if about.len() > text::LARGEST_FILE {
-        let message = format!("it has {} MB, and {} are allowed", about.len() >> 20, text::LARGEST_FILE >> 20);
-        return Err(unreadable(std::io::Error::other(message)));
-    }
     let bytes = crate::files::bytes(path, crate::files::LARGEST_TABLE).map_err(unreadable)?;
+    if let Some(what) = text::foreign(&bytes) {
+        return Err(unreadable(std::io::Error::other(what)));
+    }
     let decoded = text::decoded(&bytes).map_err(|(line, message)| TableError::Wrong { file: file.clone(), line, message })?;
     parse_as(&decoded, &file, hints)
 }

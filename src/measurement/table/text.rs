@@ -2,14 +2,32 @@
 
 use std::borrow::Cow;
 
-/// The largest file that is read, bytes: a million readings with everything that a table may have.
-pub(super) const LARGEST_FILE: u64 = 1 << 30;
+/// What `bytes` are, where they are surely no table.
+pub(super) fn foreign(bytes: &[u8]) -> Option<&'static str> {
+    let begins = bytes.trim_ascii_start();
+    match begins {
+        [b'P', b'K', 3, 4, ..] | [0xD0, 0xCF, 0x11, 0xE0, ..] => Some("it is a spreadsheet or an archive: save the sheet as CSV"),
+        [b'{' | b'[', ..] => Some("it is JSON: write it as CSV, a column for each key"),
+        [b'<', ..] => Some("it is XML or HTML: write it as CSV"),
+        [0x89, b'H', b'D', b'F', ..] => Some("it is an HDF5 or MATLAB file: write it as CSV"),
+        _ if bytes.starts_with(b"MATLAB 5.0") => Some("it is a MATLAB file: write it as CSV (writetable)"),
+        _ if bytes.starts_with(b"\x93NUMPY") => Some("it is a NumPy array: write it as CSV (numpy.savetxt with a header)"),
+        _ if bytes.starts_with(b"PAR1") => Some("it is a Parquet file: write it as CSV"),
+        _ => None,
+    }
+}
 
 /// The text of `bytes`: UTF-8, with or without a mark, or UTF-16 with one or with every other byte zero.
 ///
 /// # Errors
 /// Where it is neither, with the line of the first byte that is none.
 pub(super) fn decoded(bytes: &[u8]) -> Result<String, (u64, String)> {
+    let text = in_any_encoding(bytes)?;
+    // Lines are counted by their feeds.
+    Ok(if text.contains('\r') { text.replace("\r\n", "\n").replace('\r', "\n") } else { text })
+}
+
+fn in_any_encoding(bytes: &[u8]) -> Result<String, (u64, String)> {
     let wide = |little: bool, bytes: &[u8]| {
         let units: Vec<u16> = bytes
             .chunks_exact(2)
@@ -87,6 +105,16 @@ pub(super) fn is_missing(cell: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lines_end_as_people_have_them_and_other_files_are_named() {
+        for text in ["a,b\n1,2\n", "a,b\r\n1,2\r\n", "a,b\r1,2\r"] {
+            assert_eq!(decoded(text.as_bytes()).unwrap(), "a,b\n1,2\n");
+        }
+        assert!(foreign(b"PK\x03\x04...").unwrap().contains("spreadsheet"));
+        assert!(foreign(b"\n [{\"q\": 1}]").unwrap().contains("JSON"));
+        assert_eq!(foreign(b"q1_rad,x_m\n0,1\n"), None);
+    }
 
     #[test]
     fn encodings_are_told() {
