@@ -383,7 +383,7 @@ fn tables_that_are_wrong() {
     let recording = run.text("arm8.mcap");
     refuse(&["identify", &recording, "--robot", &robot], &["a recording carries its own nominal arm"]);
     refuse(&["identify", &recording, "--base-link", "link1"], &["--base-link link1"]);
-    refuse(&["identify", &recording, "--evaluate", &robot], &["arm8.urdf, line 1"]);
+    refuse(&["identify", &recording, "--evaluate", &robot], &["arm8.urdf: it is XML or HTML: write it as CSV"]);
     refuse(&["identify", &recording, "--seed", "3"], &["--seed 3"]);
     refuse(&["export", &robot, "--to", "urdf"], &["arm8.urdf: give a scene (.toml) or a recording"]);
     // A byte order mark and the line ends of other systems are no error, nor is a reading without one of its coordinates.
