@@ -42,9 +42,7 @@ mod signatures;
 pub(crate) mod tests;
 mod unknown;
 mod verdict;
-// Asked by the laboratory alone.
-#[cfg(feature = "cli")]
-pub(crate) mod waterfall;
+pub mod waterfall;
 mod weights;
 
 pub use evidence::Extension;

@@ -21,7 +21,7 @@ const PASSES: usize = 4;
 /// Readings with the folds of their diagnosis and the weights that they have beside the effects named: the same for every step of a
 /// waterfall.
 #[derive(Clone, Debug)]
-pub(crate) struct Waterfall<'a> {
+pub struct Waterfall<'a> {
     arm: &'a Arm,
     sensor: &'a Sensor,
     measurements: &'a [&'a Measurement],
@@ -40,7 +40,7 @@ impl<'a> Waterfall<'a> {
     ///
     /// # Errors
     /// If the measurements cannot tell where the arm stands, or are not this robot's.
-    pub(crate) fn new(
+    pub fn new(
         arm: &'a Arm,
         sensor: &'a Sensor,
         measurements: &'a [&'a Measurement],
@@ -74,14 +74,14 @@ impl<'a> Waterfall<'a> {
     /// they are: loads are those of the arm as it stands with them, also where the diagnosis found that the readings already say where it
     /// stands.
     #[must_use]
-    pub(crate) fn together(&self, effects: &[Effect]) -> Vec<Displacement> {
+    pub fn together(&self, effects: &[Effect]) -> Vec<Displacement> {
         let of = |(reading, row): (&Reading, &&Measurement)| self.together_at(effects, reading, row.payload_kg.unwrap_or(0.0));
         self.conditions.readings.iter().zip(self.measurements).map(of).collect()
     }
 
     /// The same of one `reading`, the tool carrying `payload_kg`.
     #[must_use]
-    pub(crate) fn together_at(&self, effects: &[Effect], reading: &Reading, payload_kg: f64) -> Displacement {
+    pub fn together_at(&self, effects: &[Effect], reading: &Reading, payload_kg: f64) -> Displacement {
         let known = effects.iter().filter_map(|effect| {
             let signature = effect.signature.as_ref().filter(|signature| signature.shape.can_be_read(reading))?;
             Some(Present {
@@ -96,7 +96,7 @@ impl<'a> Waterfall<'a> {
     /// What `effect` does to the target in each reading (shift in m, turn in rad, in root), to first order: the columns of what it was
     /// diagnosed to follow times their coefficients. `None` where it follows nothing (outliers), or where the readings lack what it needs.
     #[must_use]
-    pub(crate) fn displacements(&self, effect: &Effect) -> Option<Vec<Displacement>> {
+    pub fn displacements(&self, effect: &Effect) -> Option<Vec<Displacement>> {
         let signature = effect.signature.as_ref()?;
         let orientation = self.rows.equations.has_orientation();
         self.conditions.readings.iter().map(|reading| signature.displacement(reading, orientation)).collect()
@@ -107,7 +107,7 @@ impl<'a> Waterfall<'a> {
     ///
     /// # Errors
     /// If what remains is not this robot's.
-    pub(crate) fn after(&self, displacements: &[Displacement]) -> Result<f64, DiagnosisError> {
+    pub fn after(&self, displacements: &[Displacement]) -> Result<f64, DiagnosisError> {
         use rayon::prelude::*;
         let (sensor, measurements) = (self.sensor, self.measurements);
         let squares: Vec<(f64, usize)> = (0..self.scheme.folds)
