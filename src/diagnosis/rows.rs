@@ -211,7 +211,9 @@ pub fn check_robot(
         fixes.iter().try_for_each(|fix| fix.apply(&mut rows, said, &arm.slides())).ok()?;
         Some(first_fit(arm, sensor, &rows.iter().collect::<Vec<_>>(), settings, said).ok()?.rms_m)
     };
-    if mistake::is_suspicious(arm, measurements) {
+    let near = without_far(measurements, &first.far);
+    let near = if near.len() as f64 >= settings.of_this_robot * measurements.len() as f64 { near } else { measurements.to_vec() };
+    if mistake::is_suspicious(arm, &near) {
         let mistake::Hint { text: hint, explanations, another_robot } = mistake::hint(arm, said, measurements);
         let best = explanations.iter().filter_map(|found| corrected(&found.fixes)).fold(f64::INFINITY, f64::min);
         if best < FITS_BETTER * first.rms_m || another_robot {
@@ -224,6 +226,15 @@ pub fn check_robot(
         }
     }
     Ok(())
+}
+
+/// `measurements` without those that are far off by themselves; where all are from some row on, joints and poses may have slipped, and they
+/// stay.
+fn without_far<'a>(measurements: &[&'a Measurement], far: &[f64]) -> Vec<&'a Measurement> {
+    let is_far = |row: usize| far.get(row).is_some_and(|weight| *weight < robust::FAR);
+    let tail = (0..measurements.len()).rev().take_while(|row| is_far(*row)).count();
+    let last = if tail > 1 { measurements.len() - tail } else { measurements.len() };
+    (0..measurements.len()).filter(|row| *row >= last || !is_far(*row)).map(|row| measurements[row]).collect()
 }
 
 /// Rows from which on some of them are looked at first, and how many of a set-up and a target at least.
