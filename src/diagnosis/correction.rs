@@ -22,6 +22,8 @@ const SETTLED: f64 = 1e-9;
 #[derive(Clone, Debug)]
 pub struct Correction<'a> {
     waterfall: Waterfall<'a>,
+    /// The fitted arm without readings.
+    arm: Rows,
     measurements: &'a [&'a Measurement],
     diagnosis: &'a Diagnosis,
     /// Whether poses are of the target in the measurement frame, not of the tool in root.
@@ -53,7 +55,8 @@ impl<'a> Correction<'a> {
         in_measurement_frame: bool,
     ) -> Result<Self, DiagnosisError> {
         let waterfall = Waterfall::new(arm, sensor, measurements, &diagnosis.effects, &diagnosis.settings)?;
-        Ok(Correction { waterfall, measurements, diagnosis, in_measurement_frame })
+        let arm = waterfall.rows.without_readings();
+        Ok(Correction { waterfall, arm, measurements, diagnosis, in_measurement_frame })
     }
 
     /// The arm without what the effects do, from its root to its tool, or from the measurement frame to the target.
@@ -91,9 +94,9 @@ impl<'a> Correction<'a> {
 
     /// What the effects do to the target of a reading `like`, the arm come straight from `before`.
     fn displacement(&self, like: &Measurement, before: &Measurement) -> Option<[f64; 6]> {
-        let (mut rows, mut measurements): (Rows, Vec<&Measurement>) = (self.waterfall.rows.clone(), self.measurements.to_vec());
-        // It comes after all that was measured, and what was before has faded.
-        let last = measurements.iter().map(|row| row.time_s).fold(f64::NEG_INFINITY, f64::max);
+        let measurements = self.measurements;
+        let times = measurements.iter().map(|row| row.time_s);
+        let (begin, end) = times.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), time| (low.min(time), high.max(time)));
         let approached = measurements.iter().all(|row| row.approach.len() == like.joints.len());
         let known = before.approach.len() == like.joints.len();
         let side = |joint: usize| {
@@ -113,20 +116,35 @@ impl<'a> Correction<'a> {
         let temperatures_c =
             if like.temperatures_c.len() == model.temperatures_c.len() { &like.temperatures_c } else { &model.temperatures_c };
         let asked = Measurement {
-            index: measurements.len(),
-            time_s: last,
+            time_s: end,
             approach,
             temperatures_c: temperatures_c.clone(),
             ambient_c: like.ambient_c.or(model.ambient_c),
             gravity_m_s2: like.gravity_m_s2.or(model.gravity_m_s2),
             ..like.clone()
         };
-        rows.push(&asked);
-        measurements.push(&asked);
+        // It comes as long after the pose before as readings came after one another, at the end of the session, whose beginning is what
+        // temperatures rise from.
+        let pause = (end - begin) / measurements.len().max(2) as f64;
+        let before = Measurement {
+            time_s: end - pause,
+            approach: vec![0; asked.approach.len()],
+            temperatures_c: asked.temperatures_c.clone(),
+            ambient_c: asked.ambient_c,
+            session: asked.session.clone(),
+            ..before.clone()
+        };
+        let first = measurements.iter().min_by(|a, b| a.time_s.total_cmp(&b.time_s))?;
+        let mut rows = self.arm.clone();
+        let course = [*first, &before, &asked];
+        course.iter().for_each(|row| rows.push(row));
         let settings = &self.diagnosis.settings.model;
-        let (conditions, _) = conditions::conditions(&measurements, &rows, &[], Loads::AsItStands, None, settings);
-        let reading = conditions.readings.last()?;
-        Some(self.waterfall.together_at(&self.diagnosis.effects, reading, like.payload_kg.unwrap_or(0.0)))
+        let (conditions, _) = conditions::conditions(&course, &rows, &[], Loads::AsItStands, None, settings);
+        let mut readings = conditions.readings;
+        let mut reading = readings.pop()?;
+        // Steps have all happened.
+        reading.order = measurements.len();
+        Some(self.waterfall.together_at(&self.diagnosis.effects, &reading, like.payload_kg.unwrap_or(0.0)))
     }
 
     /// The joints at which the tool is where it is `wanted`, come straight from `before`, within the limits of `joints`; and how far off it

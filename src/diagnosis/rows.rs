@@ -118,6 +118,20 @@ pub(crate) struct Rows {
 }
 
 impl Rows {
+    /// The same arm without its readings.
+    #[must_use]
+    pub(crate) fn without_readings(&self) -> Rows {
+        Rows {
+            postures: Vec::new(),
+            targets: Vec::new(),
+            turn: Vec::new(),
+            residual: DVector::zeros(0),
+            jacobian: DMatrix::zeros(0, 0),
+            far: Vec::new(),
+            ..self.clone()
+        }
+    }
+
     /// Adds the arm at the joints of `row`, of the first session and target; nothing was read of it.
     pub(crate) fn push(&mut self, row: &Measurement) {
         let gravity = row.gravity(&self.mechanism.gravity);
@@ -286,16 +300,8 @@ pub(crate) fn first_fit(
     said: &Said,
 ) -> Result<First, DiagnosisError> {
     let weights = vec![1.0; measurements.len()];
-    let readings = geometry::Readings {
-        sensor,
-        measurements,
-        weights: &weights,
-        displacement: &[],
-        scatter: &[],
-        zeros: &[],
-        known: &[],
-        events: robust::Events::Counted,
-    };
+    let readings =
+        geometry::Readings { events: robust::Events::Counted, ..geometry::Readings::new(sensor, measurements, &weights) };
     let loose = geometry::fit(arm, readings)?;
     let rows = of_geometry(arm, measurements, loose.clone());
     let mechanism = Mechanism::new(arm);
@@ -338,16 +344,8 @@ impl First {
         measurements: &[&Measurement],
     ) -> Result<DVector<f64>, DiagnosisError> {
         let weights = vec![1.0; measurements.len()];
-        let readings = geometry::Readings {
-            sensor,
-            measurements,
-            weights: &weights,
-            displacement: &[],
-            scatter: &[],
-            zeros: &[],
-            known: &[],
-            events: robust::Events::Counted,
-        };
+        let readings =
+            geometry::Readings { events: robust::Events::Counted, ..geometry::Readings::new(sensor, measurements, &weights) };
         Ok(geometry::shrunk_residual(arm, readings, &self.loose)?)
     }
 }

@@ -15,16 +15,7 @@ use crate::measurement::{Measurement, Sensor};
 /// If the measurements do not tell.
 pub fn align(arm: &Arm, sensor: &Sensor, measurements: &[&Measurement]) -> Result<Arm, GeometryError> {
     let weights = vec![1.0; measurements.len()];
-    let readings = Readings {
-        sensor,
-        measurements,
-        weights: &weights,
-        displacement: &[],
-        scatter: &[],
-        zeros: &[],
-        known: &[],
-        events: crate::solver::robust::Events::LeftOut,
-    };
+    let readings = Readings::new(sensor, measurements, &weights);
     Ok(placed(arm, &geometry::fit_at(arm, readings, Sizes::NOMINAL)?))
 }
 

@@ -108,6 +108,23 @@ pub struct Readings<'a> {
     pub events: Events,
 }
 
+impl<'a> Readings<'a> {
+    /// What `sensor` read, each row weighted, of an arm of which nothing more is known.
+    #[must_use]
+    pub fn new(sensor: &'a Sensor, measurements: &'a [&'a Measurement], weights: &'a [f64]) -> Readings<'a> {
+        Readings {
+            sensor,
+            measurements,
+            weights,
+            displacement: &[],
+            scatter: &[],
+            zeros: &[],
+            known: &[],
+            events: Events::LeftOut,
+        }
+    }
+}
+
 /// A fitted geometry, and what it leaves of the readings.
 #[derive(Clone, Debug)]
 pub struct Geometry {
@@ -357,7 +374,7 @@ fn fit_to(arm: &Arm, readings: Readings<'_>, sizes: Sizes, tolerance: f64) -> Re
     let (mut names, mut session) = numbered(readings.measurements, |row| row.session.as_deref());
     if !readings.measurements.iter().any(|row| row.is_in_frame()) || readings.known.iter().any(|known| known.place == Place::Base)
     {
-        // Features are in no frame but the arm's own.
+        // Features are in no frame but the arm's own, and a base that is held is the same in all sessions.
         names.truncate(1);
         session.fill(0);
     }
@@ -1173,16 +1190,8 @@ mod tests {
             let rows = readings(&arm, 160, sessions, 0.3, 1e-9, &mut stream);
             let (fitted, others): (Vec<&Measurement>, Vec<&Measurement>) = rows.iter().partition(|row| row.index < 120);
             let weights = vec![1.0; fitted.len()];
-            let of = Readings {
-                sensor: &sensor(orientation),
-                measurements: &fitted,
-                weights: &weights,
-                displacement: &[],
-                scatter: &[],
-                zeros: &[],
-                known: &[],
-                events: Events::LeftOut,
-            };
+            let exact = sensor(orientation);
+            let of = Readings::new(&exact, &fitted, &weights);
             let found = fit(&arm, of).unwrap();
             assert_eq!((found.stop, found.sessions.len()), (Stop::Converged, sessions));
             let worst =
@@ -1199,16 +1208,7 @@ mod tests {
         let mut rows = readings(&arm, 60, 1, 0.1, 0.0, &mut stream);
         let (unmoved, weights, sensor) = (rows.clone(), vec![1.0; rows.len()], sensor(true));
         let read: Vec<&Measurement> = unmoved.iter().collect();
-        let whole = Readings {
-            sensor: &sensor,
-            measurements: &read,
-            weights: &weights,
-            displacement: &[],
-            scatter: &[],
-            zeros: &[],
-            known: &[],
-            events: Events::LeftOut,
-        };
+        let whole = Readings::new(&sensor, &read, &weights);
         let before = fit(&arm, whole).unwrap();
         let turn = before.measurement_from_root()[0].rotation;
         let displacement: Vec<[f64; 6]> = (0..60).map(|_| std::array::from_fn(|_| stream.uniform(-1e-3, 1e-3))).collect();
@@ -1239,16 +1239,7 @@ mod tests {
                 row.orientation_xyzw = row.orientation().map(|orientation| (turn * orientation).coords.into());
             }
             let fitted: Vec<&Measurement> = rows.iter().collect();
-            let of = Readings {
-                sensor: &camera,
-                measurements: &fitted,
-                weights: &[1.0; 15],
-                displacement: &[],
-                scatter: &[],
-                zeros: &[],
-                known: &[],
-                events: Events::LeftOut,
-            };
+            let of = Readings::new(&camera, &fitted, &[1.0; 15]);
             let square = |found: &Geometry| -> f64 {
                 others.iter().map(|row| difference(row, &found.predict(row)).fixed_rows::<3>(0).norm_squared()).sum()
             };
@@ -1261,16 +1252,8 @@ mod tests {
         let arm = arm(6, &mut stream);
         let rows = readings(&arm, 80, 1, 0.3, 2e-5, &mut stream);
         let fitted: Vec<&Measurement> = rows.iter().collect();
-        let of = Readings {
-            sensor: &sensor(true),
-            measurements: &fitted,
-            weights: &[1.0; 80],
-            displacement: &[],
-            scatter: &[],
-            zeros: &[],
-            known: &[],
-            events: Events::LeftOut,
-        };
+        let exact = sensor(true);
+        let of = Readings::new(&exact, &fitted, &[1.0; 80]);
         let sizes = fit(&arm, of).unwrap().likeliest_sizes();
         assert_eq!((sizes.lengths, sizes.turns), (0.3, 0.3), "{sizes:?}");
     }
@@ -1295,16 +1278,7 @@ mod tests {
             let all: Vec<&Measurement> = rows.iter().collect();
             let square = |fitted: &[&Measurement]| -> f64 {
                 let weights = vec![1.0; fitted.len()];
-                let of = Readings {
-                    sensor: &sensor,
-                    measurements: fitted,
-                    weights: &weights,
-                    displacement: &[],
-                    scatter: &[],
-                    zeros: &[],
-                    known: &[],
-                    events: Events::LeftOut,
-                };
+                let of = Readings::new(&sensor, fitted, &weights);
                 let found = fit(&arm, of).unwrap();
                 others.iter().map(|row| difference(row, &found.predict(row)).fixed_rows::<3>(0).norm_squared()).sum()
             };
@@ -1315,43 +1289,36 @@ mod tests {
     }
 
     proptest! {
-            #![proptest_config(ProptestConfig::with_cases(24))]
+        #![proptest_config(ProptestConfig::with_cases(24))]
 
-            /// Whatever the arm, the readings (sound or not), what was read of them, the weights and the start.
-            #[test]
-            fn no_step_of_a_geometry_raises_the_cost(
-                seed in 0u64..1_000_000, joints in 2usize..8, count in 8usize..24, wrong in 0.0..20.0f64, noise in 0.0..0.3f64,
-                orientation: bool, sessions in 1usize..3, away in 0.0..1.5f64, scale in 0.003..3.0f64,
-            ) {
-                let mut stream = stream(seed, "test/geometry/descent");
-                let arm = arm(joints, &mut stream);
-                let mut rows = readings(&arm, count, sessions, wrong, noise, &mut stream);
-                for row in &mut rows {
-                    row.unread[2] = stream.unit() < 0.3;
-                }
-                let read: Vec<&Measurement> = rows.iter().collect();
-                let weights: Vec<f64> = (0..count).map(|_| stream.unit()).collect();
-                let session: Vec<usize> = (0..count).map(|row| row % sessions).collect();
-                let of = Readings {
-                    sensor: &sensor(orientation),
-                    measurements: &read,
-                    weights: &weights,
-                    displacement: &[],
-                    scatter: &[],
-                    zeros: &[],
-    known: &[], events: Events::LeftOut,
-                };
-                let problem = Placing::new(&arm, of, &session, sessions, Sizes { zeros: scale, lengths: scale, turns: scale }).unwrap();
-                let all: Vec<usize> = (0..problem.free.len()).collect();
-                let start = problem.start(&arm).unwrap();
-                let step = DVector::from_fn(all.len(), |_, _| away * stream.normal());
-                let start = problem.moved(&start, &all, &step);
-                let mut before = problem.linearise(&start).cost();
-                for most in 1..16 {
-                    let cost = solve(&problem, &all, start.clone(), most).linearised.cost();
-                    prop_assert!(cost <= before * (1.0 + 1e-11), "{before} became {cost} in step {most}");
-                    before = cost;
-                }
+        /// Whatever the arm, the readings (sound or not), what was read of them, the weights and the start.
+        #[test]
+        fn no_step_of_a_geometry_raises_the_cost(
+            seed in 0u64..1_000_000, joints in 2usize..8, count in 8usize..24, wrong in 0.0..20.0f64, noise in 0.0..0.3f64,
+            orientation: bool, sessions in 1usize..3, away in 0.0..1.5f64, scale in 0.003..3.0f64,
+        ) {
+            let mut stream = stream(seed, "test/geometry/descent");
+            let arm = arm(joints, &mut stream);
+            let mut rows = readings(&arm, count, sessions, wrong, noise, &mut stream);
+            for row in &mut rows {
+                row.unread[2] = stream.unit() < 0.3;
+            }
+            let read: Vec<&Measurement> = rows.iter().collect();
+            let weights: Vec<f64> = (0..count).map(|_| stream.unit()).collect();
+            let session: Vec<usize> = (0..count).map(|row| row % sessions).collect();
+            let exact = sensor(orientation);
+            let of = Readings::new(&exact, &read, &weights);
+            let problem = Placing::new(&arm, of, &session, sessions, Sizes { zeros: scale, lengths: scale, turns: scale }).unwrap();
+            let all: Vec<usize> = (0..problem.free.len()).collect();
+            let start = problem.start(&arm).unwrap();
+            let step = DVector::from_fn(all.len(), |_, _| away * stream.normal());
+            let start = problem.moved(&start, &all, &step);
+            let mut before = problem.linearise(&start).cost();
+            for most in 1..16 {
+                let cost = solve(&problem, &all, start.clone(), most).linearised.cost();
+                prop_assert!(cost <= before * (1.0 + 1e-11), "{before} became {cost} in step {most}");
+                before = cost;
             }
         }
+    }
 }

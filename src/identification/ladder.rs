@@ -229,16 +229,7 @@ mod tests {
         let sensor = Sensor::uniform(1e-4, None);
         let fitted = |rows: &[&Measurement], from: Option<&Geometry>| {
             let weights = vec![1.0; rows.len()];
-            let readings = Readings {
-                sensor: &sensor,
-                measurements: rows,
-                weights: &weights,
-                displacement: &[],
-                scatter: &[],
-                zeros: &[],
-                known: &[],
-                events: robust::Events::LeftOut,
-            };
+            let readings = Readings::new(&sensor, rows, &weights);
             let sizes = from.map_or(Sizes::MANUFACTURING, Geometry::sizes);
             let geometry = super::super::geometry::fit_at(&arm, readings, sizes).unwrap();
             let left = from.is_none().then(|| left_out(&geometry, readings, &[true; 50]));

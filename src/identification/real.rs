@@ -327,16 +327,7 @@ fn tell(
     let fit: Vec<&Measurement> = measurements.iter().filter(|row| row.role == Role::Fit).collect();
     let Climbed { geometry, rungs } = climbed;
     let weights = vec![1.0; fit.len()];
-    let readings = Readings {
-        sensor,
-        measurements: &fit,
-        weights: &weights,
-        displacement: &[],
-        scatter: &[],
-        zeros: &[],
-        known: &[],
-        events: robust::Events::LeftOut,
-    };
+    let readings = Readings::new(sensor, &fit, &weights);
     let nominal = geometry.refit(robot, readings, Sizes::NOMINAL)?.with_features_of(measurements);
     let geometry = geometry.with_features_of(measurements);
     let aligned = &alignment::placed(robot, &nominal);

@@ -135,16 +135,7 @@ mod tests {
             let rows = readings(&arm, 80, 1, wrong, 5e-5, &mut stream);
             let read: Vec<&Measurement> = rows.iter().collect();
             let sensor = sensor(orientation);
-            let of = Readings {
-                sensor: &sensor,
-                measurements: &read,
-                weights: &[1.0; 80],
-                displacement: &[],
-                scatter: &[],
-                zeros: &[],
-                known: &[],
-                events: robust::Events::LeftOut,
-            };
+            let of = Readings::new(&sensor, &read, &[1.0; 80]);
             let loose = fit_at(&arm, of, Sizes::MANUFACTURING).unwrap();
             for sizes in
                 [Sizes::NOMINAL, Sizes { zeros: 1.0, lengths: 0.0, turns: 0.0 }, Sizes { zeros: 0.3, lengths: 0.1, turns: 0.03 }]
